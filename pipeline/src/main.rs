@@ -1,0 +1,3 @@
+//! The `sfm` program.
+
+fn main() {}
