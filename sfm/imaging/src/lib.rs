@@ -15,6 +15,8 @@ mod hash;
 mod jpeg;
 mod orient;
 mod resize;
+#[cfg(feature = "video")]
+pub mod video;
 
 pub use blur::{gaussian_blur, gaussian_kernel};
 pub use colour::grey_from_rgb;
