@@ -162,11 +162,11 @@ impl Frames {
     }
 
     /// At the end of the stream: an error where it comes too early. Announced counts are estimates, hence some slack.
-    fn end(&self) -> Option<Result<(f64, Raster<[u8; 3]>), ImagingError>> {
+    fn early_end(&self) -> Option<ImagingError> {
         let announced = self.video.info.frame_count?;
         let slack = announced / 50 + 5;
         (self.read + slack < announced)
-            .then(|| Err(self.failed(format_args!("ends after {} of {announced} frames: truncated or damaged", self.read))))
+            .then(|| self.failed(format_args!("ends after {} of {announced} frames: truncated or damaged", self.read)))
     }
 }
 
@@ -177,7 +177,7 @@ impl Iterator for Frames {
         while !self.done {
             if !self.video.capture.grab().unwrap_or(false) {
                 self.done = true;
-                return self.end();
+                return self.early_end().map(Err);
             }
             self.read += 1;
             let time = self.time();
