@@ -9,6 +9,7 @@
 
 pub mod camera;
 pub mod cloud;
+pub mod format;
 pub mod ids;
 pub mod keypoint;
 pub mod mesh;
