@@ -1,0 +1,5 @@
+//! Small numerical tools that the solvers share.
+
+pub(crate) mod minimise;
+pub(crate) mod null_space;
+pub(crate) mod polynomial;

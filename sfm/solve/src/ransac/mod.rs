@@ -1,0 +1,15 @@
+//! Robust estimation of a model from correspondences with outliers: LO-RANSAC in three parts that vary alone.
+//!
+//! - an [`Estimator`] knows the model: it solves a minimal sample, measures errors and refines;
+//! - a [`Sampler`] draws minimal samples: [`UniformSampler`], [`GroupedSampler`];
+//! - a [`Scoring`] turns errors into a cost: [`Msac`], [`InlierCount`].
+//!
+//! [`run`] joins them. Results depend on the input and the seed alone.
+
+mod engine;
+mod sampler;
+mod scoring;
+
+pub use engine::{Estimator, Ransac, RansacOptions, run};
+pub use sampler::{GroupedSampler, Sampler, UniformSampler};
+pub use scoring::{InlierCount, Msac, Scoring};
