@@ -1,1 +1,18 @@
-//! pipeline
+//! The `sfm` program: dive.toml, the stage store, the stages and the recipe that joins them.
+//!
+//! Three layers: the command (`cli`) parses, a stage (`stages`) loads, calls and saves, and the algorithm in another
+//! package computes.
+
+pub mod cli;
+pub mod clock;
+pub mod config;
+pub mod error;
+pub mod figures;
+pub mod init;
+pub mod plan;
+pub mod progress;
+pub mod recipe;
+pub mod run;
+pub mod stage;
+pub mod stages;
+pub mod store;

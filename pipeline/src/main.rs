@@ -1,3 +1,5 @@
 //! The `sfm` program.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    pipeline::cli::main()
+}

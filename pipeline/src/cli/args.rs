@@ -1,0 +1,87 @@
+//! What can be said on the command line.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done; there may be warnings, which are counted at the end and listed in report.json
+  1  failed: a file could not be read or written, the output folder is in use
+  2  the command line or dive.toml is wrong
+  3  the images give no result: none can be read, none overlap";
+
+/// Oriented cameras, metric clouds and their quality from underwater photographs.
+#[derive(Debug, Parser)]
+#[command(name = "sfm", version, after_help = EXIT_CODES, disable_help_subcommand = true, arg_required_else_help = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Do what a dive.toml says, and skip what is done already.
+    #[command(after_help = EXIT_CODES)]
+    Run(RunArgs),
+    /// Tell which stages are done, stale or missing, and why.
+    Status(StatusArgs),
+    /// Write a commented dive.toml for a folder of images or videos to stdout.
+    Init(InitArgs),
+    /// Explain a command; `sfm help json` explains the keys of report.json.
+    Help(HelpArgs),
+}
+
+/// Arguments of `sfm run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// The configuration.
+    #[arg(default_value = "dive.toml")]
+    pub dive: PathBuf,
+    /// Make STAGE and all after it anew.
+    #[arg(long, value_name = "STAGE", value_parser = stage_name)]
+    pub from: Option<String>,
+    /// Stop after STAGE.
+    #[arg(long, value_name = "STAGE", value_parser = stage_name)]
+    pub until: Option<String>,
+    /// Make STAGE anew, and after it only what changes.
+    #[arg(long, value_name = "STAGE", value_parser = stage_name)]
+    pub force: Option<String>,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print the figures of the run, with the time of each stage, as JSON to stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sfm status`.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// The configuration.
+    #[arg(default_value = "dive.toml")]
+    pub dive: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sfm init`.
+#[derive(Debug, Args)]
+pub struct InitArgs {
+    /// Folder of images, of one folder of images a camera, or of videos.
+    pub folder: PathBuf,
+}
+
+/// Arguments of `sfm help`.
+#[derive(Debug, Args)]
+pub struct HelpArgs {
+    /// A command, or `json`.
+    pub topic: Option<String>,
+}
+
+fn stage_name(text: &str) -> Result<String, String> {
+    let names: Vec<&str> = crate::recipe::RECIPE.iter().map(|s| s.name).collect();
+    if names.contains(&text) { Ok(text.to_owned()) } else { Err(format!("the stages are {}", names.join(", "))) }
+}

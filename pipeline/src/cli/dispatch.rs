@@ -1,0 +1,58 @@
+//! From the command line to an exit code.
+
+use super::args::{Cli, Command};
+use super::{help, init, run, status};
+use crate::config::ConfigError;
+use crate::error::NoResult;
+use clap::Parser;
+use std::io::{ErrorKind, Write};
+use std::process::ExitCode;
+
+/// Wrong command line or dive.toml; clap uses the same.
+const USAGE: u8 = 2;
+/// The images give no result.
+const NO_RESULT: u8 = 3;
+
+/// The program.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match &cli.command {
+        Command::Run(args) => run::run(args),
+        Command::Status(args) => status::status(args),
+        Command::Init(args) => init::init(args),
+        Command::Help(args) => help::help(args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            if is_closed_pipe(&error) {
+                return ExitCode::SUCCESS;
+            }
+            eprintln!("error: {error:#}");
+            exit_code(&error)
+        }
+    }
+}
+
+fn exit_code(error: &anyhow::Error) -> ExitCode {
+    if error.chain().any(|e| e.is::<ConfigError>() || e.is::<super::help::NoTopic>()) {
+        ExitCode::from(USAGE)
+    } else if error.chain().any(|e| e.is::<NoResult>()) {
+        ExitCode::from(NO_RESULT)
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+/// `sfm init frames | head` closes stdout early; that is no failure.
+fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|e| e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe))
+}
+
+/// Writes data to stdout.
+pub(super) fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes())?;
+    Ok(out.flush()?)
+}

@@ -1,0 +1,14 @@
+//! The command line: parses, calls, prints. Data go to stdout, all else to stderr.
+
+mod args;
+mod dispatch;
+mod help;
+mod init;
+mod keys;
+mod run;
+mod status;
+mod terminal;
+
+pub use args::Cli;
+pub use dispatch::main;
+pub use keys::REPORT_KEYS;

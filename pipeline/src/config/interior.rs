@@ -1,0 +1,138 @@
+//! `[camera.interior]`, in dive.toml or in a file of its own.
+
+use super::error::{ConfigError, Source};
+use super::keys::check_names;
+use super::model::InteriorConfig;
+use super::raw::RawInterior;
+use super::values::Values;
+use scene::CameraModel;
+use scene::camera::ParamKind;
+use std::path::Path;
+use toml::Spanned;
+
+/// Model of cameras of which no model is given: enough for the distortion of most lenses, also behind a port.
+const DEFAULT_MODEL: CameraModel = CameraModel::Radial;
+
+impl Default for InteriorConfig {
+    fn default() -> Self {
+        Self { model: DEFAULT_MODEL, size: None, params: Vec::new(), fixed: false }
+    }
+}
+
+/// The interior orientation of a camera; `folder` is where relative file names start.
+pub(super) fn resolve(source: &mut Source<'_>, folder: &Path, raw: Option<&Spanned<RawInterior>>) -> InteriorConfig {
+    let Some(raw) = raw else { return InteriorConfig::default() };
+    let interior = raw.get_ref();
+    let Some(file) = &interior.file else { return values(source, interior, raw.span()) };
+    let key = "camera.interior.file";
+    if interior.model.is_some() || !interior.params().is_empty() {
+        source.problem(
+            Some(file.span()),
+            key,
+            "stands beside a model or parameters",
+            Some("give either `file`, or the model and its parameters".to_owned()),
+        );
+    }
+    let path = folder.join(file.get_ref());
+    match std::fs::read_to_string(&path) {
+        Err(e) => source.problem(Some(file.span()), key, format!("cannot read {}: {e}", path.display()), None),
+        Ok(text) => match read_file(&path, &text) {
+            Ok(mut config) => {
+                // What stands in dive.toml goes before what stands in the file.
+                if let Some(fixed) = &interior.fixed {
+                    config.fixed = *fixed.get_ref();
+                }
+                return config;
+            }
+            Err(error) => source.add(error),
+        },
+    }
+    InteriorConfig::default()
+}
+
+fn read_file(path: &Path, text: &str) -> Result<InteriorConfig, ConfigError> {
+    let mut source = Source::new(path, text);
+    let config = super::resolve::raw_table::<RawInterior>(&mut source, |source, table| check_names(source, table, "camera.interior"))
+        .map(|raw| values(&mut source, &raw, 0..0));
+    source.finish(config)
+}
+
+fn values(source: &mut Source<'_>, raw: &RawInterior, whole: std::ops::Range<usize>) -> InteriorConfig {
+    let mut values = Values { source };
+    let models: Vec<(&'static str, CameraModel)> = CameraModel::ALL.into_iter().map(|m| (m.name(), m)).collect();
+    let model = values.choice("camera.interior.model", &raw.model, &models);
+    let given = raw.params();
+    if let (None, None, Some((name, value))) = (model, &raw.model, given.first()) {
+        let hint = format!("add `model = \"{}\"` or another", DEFAULT_MODEL.name());
+        values.problem_with_hint(value.span(), &format!("camera.interior.{name}"), "the model that it belongs to is missing", hint);
+    }
+    let size = size(&mut values, raw, &whole);
+    let mut config = InteriorConfig { model: model.unwrap_or(DEFAULT_MODEL), size, ..InteriorConfig::default() };
+    if let (Some(model), false) = (model, given.is_empty()) {
+        config.params = params(&mut values, model, &given, &whole);
+    }
+    config.fixed = raw.fixed.as_ref().is_some_and(|f| *f.get_ref());
+    if let (true, true, Some(fixed)) = (config.fixed, given.is_empty(), &raw.fixed) {
+        values.problem_with_hint(
+            fixed.span(),
+            "camera.interior.fixed",
+            "no parameters are given that could be kept",
+            "add them, or leave `fixed` out",
+        );
+    }
+    config
+}
+
+fn params(
+    values: &mut Values<'_, '_>,
+    model: CameraModel,
+    given: &[(&'static str, &Spanned<f64>)],
+    whole: &std::ops::Range<usize>,
+) -> Vec<Option<f64>> {
+    let names = model.param_names();
+    for (name, value) in given {
+        if !names.contains(name) {
+            let hint = format!("its parameters are {}", names.join(", "));
+            values.problem_with_hint(
+                value.span(),
+                &format!("camera.interior.{name}"),
+                format!("model \"{}\" has no such parameter", model.name()),
+                hint,
+            );
+        }
+    }
+    let mut params = Vec::with_capacity(names.len());
+    for (name, kind) in names.iter().zip(model.param_kinds()) {
+        let key = format!("camera.interior.{name}");
+        let place = given.iter().find(|(n, _)| n == name).map(|(_, value)| (*value).clone());
+        if *kind == ParamKind::Focal {
+            if place.is_none() {
+                let hint = "give it in pixels, or leave all parameters out to start from EXIF or a guess";
+                values.problem_with_hint(whole.clone(), &key, "is missing beside the other parameters", hint);
+            }
+            params.push(values.positive(&key, &place));
+        } else {
+            params.push(values.finite(&key, &place));
+        }
+    }
+    params
+}
+
+fn size(values: &mut Values<'_, '_>, raw: &RawInterior, whole: &std::ops::Range<usize>) -> Option<(u32, u32)> {
+    match (&raw.width, &raw.height) {
+        (Some(width), Some(height)) => {
+            for (key, value) in [("camera.interior.width", width), ("camera.interior.height", height)] {
+                if *value.get_ref() == 0 {
+                    values.problem(value.span(), key, "must be above 0, is 0");
+                }
+            }
+            Some((*width.get_ref(), *height.get_ref()))
+        }
+        (None, None) => None,
+        (width, _) => {
+            let (key, other) = if width.is_some() { ("width", "height") } else { ("height", "width") };
+            values.problem(whole.clone(), &format!("camera.interior.{key}"), format!("`{other}` is missing beside it"));
+            None
+        }
+    }
+}

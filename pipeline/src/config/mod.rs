@@ -1,0 +1,22 @@
+//! dive.toml: read with the place of every value ([`read`]), checked, and resolved into a [`Config`].
+
+mod error;
+mod files;
+mod interior;
+mod keys;
+mod model;
+mod raw;
+mod resolve;
+mod rig;
+mod stages;
+#[cfg(test)]
+mod tests;
+mod values;
+
+pub use error::{ConfigError, ConfigProblem};
+pub use files::IMAGE_EXTENSIONS;
+pub(crate) use files::{NamePart, is_image, natural_key};
+pub use keys::KEYS;
+pub use model::*;
+pub(crate) use resolve::is_safe_name;
+pub use resolve::{parse, read};

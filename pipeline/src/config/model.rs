@@ -1,0 +1,241 @@
+//! The configuration as resolved: every default filled in, every value checked.
+
+use scene::{CameraModel, Rigid3};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What a run does and with what.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// The dive.toml.
+    pub file: PathBuf,
+    /// Name of the dive, for headings.
+    pub name: String,
+    /// Folder that the run writes to.
+    pub output: PathBuf,
+    /// How exposures pair up into frames.
+    pub frames_from: FramesFrom,
+    /// The cameras, at least one; the first is the reference of the rig.
+    pub cameras: Vec<CameraConfig>,
+    /// What is known of the mounting of the cameras.
+    pub rig: RigConfig,
+    /// Known lengths in the scene.
+    pub scale_bars: Vec<ScaleBarConfig>,
+    /// Options of the stage `mask`.
+    pub mask: MaskConfig,
+    /// Options of the stage `features`.
+    pub features: FeaturesConfig,
+    /// Options of the stage `matching`.
+    pub matching: MatchingConfig,
+    /// Options of the stage `evaluate`.
+    pub evaluate: EvaluateConfig,
+}
+
+/// How exposures of several cameras pair up into frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FramesFrom {
+    /// The n-th image of every camera.
+    Order,
+    /// Equal file names without extension, or else the last number in them.
+    Stem,
+    /// The time of exposure in the EXIF data, or of the video frame.
+    Timestamp,
+}
+
+/// A camera.
+#[derive(Clone, Debug)]
+pub struct CameraConfig {
+    /// Name, unique, safe as a folder name.
+    pub name: String,
+    /// Where its images come from.
+    pub images: ImageSource,
+    /// Pattern of its mask files, with `{stem}` in it.
+    pub mask: Option<MaskPattern>,
+    /// What is known of its interior orientation.
+    pub interior: InteriorConfig,
+}
+
+/// Where images come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ImageSource {
+    /// Files, in natural order of their names, at least one.
+    Files(Vec<PathBuf>),
+    /// Frames of a video.
+    Video {
+        /// The file.
+        file: PathBuf,
+        /// Frames a second that are taken.
+        rate_hz: f64,
+        /// Time of the first frame that is taken, seconds.
+        offset_secs: f64,
+    },
+}
+
+/// Where the mask of an image lies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MaskPattern {
+    /// The folder that relative patterns start from.
+    pub folder: PathBuf,
+    /// The pattern as written.
+    pub pattern: String,
+}
+
+impl MaskPattern {
+    /// The mask file of an image.
+    #[must_use]
+    pub fn file(&self, stem: &str) -> PathBuf {
+        self.folder.join(self.pattern.replace("{stem}", stem))
+    }
+}
+
+/// What is known of an interior orientation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InteriorConfig {
+    /// The model.
+    #[serde(serialize_with = "model_name")]
+    pub model: CameraModel,
+    /// Image size that the parameters belong to, pixels; that of the images when absent.
+    pub size: Option<(u32, u32)>,
+    /// The given parameters, in the order of the model; `None` for one that is not given. Empty when none is.
+    pub params: Vec<Option<f64>>,
+    /// The given parameters are not refined.
+    pub fixed: bool,
+}
+
+fn model_name<S: serde::Serializer>(model: &CameraModel, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(model.name())
+}
+
+/// How the cameras are treated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RigMode {
+    /// One pose a frame.
+    Rigid,
+    /// One pose an image, constrained by known distances.
+    Baselines,
+    /// One pose an image.
+    None,
+}
+
+/// What is known of the mounting of the cameras.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigConfig {
+    /// How the cameras are treated.
+    pub mode: RigMode,
+    /// Known poses in the rig, one entry a camera; the first camera has the identity where any is known.
+    pub poses: Vec<Option<PoseConfig>>,
+    /// Known distances.
+    pub baselines: Vec<BaselineConfig>,
+}
+
+/// A known pose in the rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseConfig {
+    /// The pose, metres.
+    pub cam_from_rig: Rigid3,
+    /// Standard deviations of rotation (radians) and translation (metres); `None` keeps the pose fixed.
+    pub sigma: Option<(f64, f64)>,
+}
+
+/// A known distance between two cameras.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BaselineConfig {
+    /// Indices of the cameras.
+    pub cameras: (usize, usize),
+    /// Metres.
+    pub length_m: f64,
+    /// Standard deviation, metres.
+    pub sigma_m: f64,
+}
+
+/// A known length in the scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScaleBarConfig {
+    /// Name, for the report.
+    pub name: String,
+    /// Metres.
+    pub length_m: f64,
+    /// Standard deviation, metres.
+    pub sigma_m: f64,
+    /// Only compared, not used.
+    pub check: bool,
+    /// Where both ends were picked.
+    pub ends: [Vec<PickConfig>; 2],
+}
+
+/// A point picked in an image.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PickConfig {
+    /// Name of the image, `camera/file`.
+    pub image: String,
+    /// Column, pixels.
+    pub x: f64,
+    /// Row, pixels.
+    pub y: f64,
+}
+
+/// How masks are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MaskStrategy {
+    /// Every pixel takes part.
+    None,
+    /// Masks are read from files.
+    Files,
+    /// Masks are made by image processing.
+    Ip,
+}
+
+impl MaskStrategy {
+    /// The name in dive.toml and in `out/masks/<strategy>`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Files => "files",
+            Self::Ip => "ip",
+        }
+    }
+}
+
+/// Options of the stage `mask`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MaskConfig {
+    /// How masks are made.
+    pub strategy: MaskStrategy,
+}
+
+/// Options of the stage `features`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FeaturesConfig {
+    /// Most keypoints an image.
+    pub max_keypoints: u32,
+}
+
+/// Which pairs of images are matched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PairRule {
+    /// Exhaustive up to 200 images, sequential above.
+    Auto,
+    /// All pairs.
+    Exhaustive,
+    /// Neighbours in time, and loop candidates.
+    Sequential,
+}
+
+/// Options of the stage `matching`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MatchingConfig {
+    /// Which pairs are matched.
+    pub pairs: PairRule,
+}
+
+/// Options of the stage `evaluate`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EvaluateConfig {
+    /// What the cloud is compared with.
+    pub reference: Option<PathBuf>,
+}

@@ -1,0 +1,148 @@
+//! The file as written: every value optional, with its place in the text. Nothing is checked here but names and types.
+
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use toml::Spanned;
+
+pub(super) type Place<T> = Option<Spanned<T>>;
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawConfig {
+    pub(super) dive: RawDive,
+    pub(super) camera: Vec<Spanned<RawCamera>>,
+    pub(super) rig: RawRig,
+    pub(super) scale_bar: Vec<Spanned<RawScaleBar>>,
+    pub(super) mask: RawMask,
+    pub(super) features: RawFeatures,
+    pub(super) matching: RawMatching,
+    pub(super) orient: RawOrient,
+    pub(super) densify: RawDensify,
+    pub(super) evaluate: RawEvaluate,
+    pub(super) report: RawReport,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawDive {
+    pub(super) name: Place<String>,
+    pub(super) output: Place<String>,
+    pub(super) frames_from: Place<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawCamera {
+    pub(super) name: Place<String>,
+    pub(super) images: Place<String>,
+    pub(super) video: Place<String>,
+    pub(super) rate_hz: Place<f64>,
+    pub(super) offset_secs: Place<f64>,
+    pub(super) mask: Place<String>,
+    pub(super) interior: Place<RawInterior>,
+}
+
+macro_rules! raw_interior {
+    ($($param:ident)*) => {
+        /// Interior orientation, in dive.toml or in a file of its own.
+        #[derive(Debug, Default, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub(super) struct RawInterior {
+            pub(super) file: Place<String>,
+            pub(super) model: Place<String>,
+            pub(super) width: Place<u32>,
+            pub(super) height: Place<u32>,
+            pub(super) fixed: Place<bool>,
+            $($param: Place<f64>,)*
+        }
+
+        impl RawInterior {
+            /// The parameters that are given, by name.
+            pub(super) fn params(&self) -> Vec<(&'static str, &Spanned<f64>)> {
+                [$((stringify!($param), &self.$param),)*].into_iter().filter_map(|(name, value)| Some((name, value.as_ref()?))).collect()
+            }
+        }
+    };
+}
+raw_interior!(f fx fy cx cy k k1 k2 k3 k4 p1 p2 c x0 y0 a1 a2 a3 b1 b2 c1 c2);
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawRig {
+    pub(super) mode: Place<String>,
+    pub(super) baseline: Vec<Spanned<RawBaseline>>,
+    pub(super) pose: BTreeMap<Spanned<String>, Spanned<RawPose>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawBaseline {
+    pub(super) between: Place<Vec<Spanned<String>>>,
+    pub(super) length_m: Place<f64>,
+    pub(super) sigma_m: Place<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawPose {
+    pub(super) quaternion_wxyz: Place<Vec<f64>>,
+    pub(super) axis_angle_deg: Place<Vec<f64>>,
+    pub(super) matrix: Place<Vec<Vec<f64>>>,
+    pub(super) translation_m: Place<Vec<f64>>,
+    pub(super) sigma_deg: Place<f64>,
+    pub(super) sigma_m: Place<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawScaleBar {
+    pub(super) name: Place<String>,
+    pub(super) length_m: Place<f64>,
+    pub(super) sigma_m: Place<f64>,
+    pub(super) check: Place<bool>,
+    pub(super) endpoints: Place<Vec<Vec<Spanned<RawPick>>>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawPick {
+    pub(super) image: Place<String>,
+    pub(super) x: Place<f64>,
+    pub(super) y: Place<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawMask {
+    pub(super) strategy: Place<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawFeatures {
+    pub(super) max_keypoints: Place<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawMatching {
+    pub(super) pairs: Place<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawOrient {}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawDensify {}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawEvaluate {
+    pub(super) reference: Place<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawReport {}

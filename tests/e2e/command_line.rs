@@ -1,0 +1,221 @@
+//! The program as a user meets it: exit codes, what is on stdout, init, status, resume.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+
+struct Dive {
+    folder: tempfile::TempDir,
+}
+
+impl Dive {
+    /// Two cameras of three small images each, below `frames`.
+    fn new() -> Self {
+        let dive = Self { folder: tempfile::tempdir().unwrap() };
+        for (c, camera) in ["left", "right"].iter().enumerate() {
+            std::fs::create_dir_all(dive.path(&format!("frames/{camera}"))).unwrap();
+            for i in 0..3 {
+                std::fs::write(dive.path(&format!("frames/{camera}/{i}.png")), png(64, 48, (10 * c + i) as u32)).unwrap();
+            }
+        }
+        dive
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).unwrap();
+    }
+
+    fn sfm(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_sfm")).args(arguments).current_dir(self.folder.path()).output().unwrap()
+    }
+
+    /// The standard output of a call that succeeds.
+    fn ok(&self, arguments: &[&str]) -> String {
+        let output = self.sfm(arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// Exit code and standard error of a call that fails without a panic.
+    fn fails(&self, arguments: &[&str]) -> (i32, String) {
+        let output = self.sfm(arguments);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(!stderr.contains("panicked"), "{stderr}");
+        assert!(output.stdout.is_empty(), "nothing but data belongs on stdout");
+        (output.status.code().unwrap(), stderr)
+    }
+}
+
+/// A grey image of deterministic noise.
+fn png(width: usize, height: usize, seed: u32) -> Vec<u8> {
+    let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(1);
+    let values = std::iter::repeat_with(|| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 24) as u8
+    });
+    imaging::encode_png_grey(&scene::Raster::from_vec(width, height, values.take(width * height).collect()).unwrap()).unwrap()
+}
+
+const TWO: &str = "[[camera]]\nname = \"L\"\nimages = \"frames/left\"\n[[camera]]\nname = \"R\"\nimages = \"frames/right\"\n";
+
+/// Every file of an output folder whose bytes are promised.
+fn tree(root: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![root.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.strip_prefix(root).unwrap().to_string_lossy().into_owned();
+            if path.is_dir() {
+                folders.push(path);
+            } else if name != "log.jsonl" && name != "timings.json" {
+                files.insert(name, std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+#[test]
+fn init_writes_a_file_that_runs() {
+    let dive = Dive::new();
+    let text = dive.ok(&["init", "frames"]);
+    assert!(text.contains("frames_from = \"stem\"") && text.contains("name = \"left\"") && text.contains("64 x 48 pixels"), "{text}");
+    dive.write("dive.toml", &text);
+    dive.ok(&["run", "--until", "ingest"]);
+    let list: serde_json::Value = serde_json::from_slice(&std::fs::read(dive.path("out/frames/images.json")).unwrap()).unwrap();
+    let images = list["images"].as_array().unwrap();
+    assert_eq!(images.len(), 6);
+    assert_eq!((&images[1]["name"], &images[1]["exposure"]), (&"left/1.png".into(), &1.into()));
+    assert_eq!((&images[4]["name"], &images[4]["exposure"]), (&"right/1.png".into(), &1.into()));
+}
+
+#[test]
+fn init_of_nothing_is_told() {
+    let dive = Dive::new();
+    std::fs::create_dir(dive.path("empty")).unwrap();
+    assert_eq!(dive.fails(&["init", "empty"]).0, 3);
+    assert_eq!(dive.fails(&["init", "missing"]).0, 1);
+}
+
+#[test]
+fn a_wrong_file_or_command_line_exits_with_2() {
+    let dive = Dive::new();
+    dive.write("dive.toml", &format!("{TWO}[mask]\nstratgy = \"ip\"\n"));
+    let (code, message) = dive.fails(&["run"]);
+    assert_eq!(code, 2);
+    assert!(message.contains("dive.toml:8:1: mask.stratgy: unknown key\n  hint: did you mean `strategy`?"), "{message}");
+    assert_eq!(dive.fails(&["run", "nowhere.toml"]).0, 2);
+    assert_eq!(dive.fails(&["run", "--until", "everything"]).0, 2);
+    assert_eq!(dive.fails(&["help", "nothing"]).0, 2);
+    assert!(!dive.path("out").exists(), "a wrong file writes nothing");
+}
+
+#[test]
+fn status_says_what_changed() {
+    let dive = Dive::new();
+    dive.write("dive.toml", TWO);
+    let line = || dive.ok(&["status"]).lines().next().unwrap().to_owned();
+    assert_eq!(line(), "ingest     missing  not run yet");
+    dive.ok(&["run", "--until", "ingest"]);
+    assert_eq!(line().trim_end(), "ingest     done");
+    dive.write("dive.toml", &format!("{TWO}[dive]\nframes_from = \"stem\"\n"));
+    assert_eq!(line(), "ingest     stale    frames_from was \"order\", is \"stem\"");
+    dive.write("dive.toml", TWO);
+    std::fs::write(dive.path("frames/left/1.png"), png(64, 48, 99)).unwrap();
+    assert_eq!(line(), "ingest     stale    L/1.png (2) is changed");
+    dive.ok(&["run", "--until", "ingest"]);
+    std::fs::remove_file(dive.path("out/frames/images.json")).unwrap();
+    assert_eq!(line(), "ingest     missing  frames/images.json is gone or cut short");
+}
+
+#[test]
+fn bad_images_are_warnings() {
+    let dive = Dive::new();
+    std::fs::write(dive.path("frames/left/3.jpg"), "dear diary").unwrap();
+    std::fs::write(dive.path("frames/left/4.png"), "").unwrap();
+    std::fs::write(dive.path("frames/left/5.png"), png(32, 48, 5)).unwrap();
+    std::fs::copy(dive.path("frames/left/0.png"), dive.path("frames/left/6.png")).unwrap();
+    dive.write("dive.toml", TWO);
+    let report: serde_json::Value = serde_json::from_str(&dive.ok(&["run", "--until", "ingest", "--json"])).unwrap();
+    assert_eq!((&report["images"]["found"], &report["images"]["total"]), (&10.into(), &6.into()));
+    let warnings: Vec<String> =
+        report["warnings"].as_array().unwrap().iter().map(|w| format!("{}: {}", w["about"], w["message"])).collect();
+    assert_eq!(warnings.len(), 4, "{warnings:?}");
+    for (warning, word) in warnings.iter().zip(["not an image", "empty file", "32 x 48", "copy of L/0.png"]) {
+        assert!(warning.contains(word), "{warning} has no {word}");
+    }
+    assert!(report["stages"]["ingest"]["seconds"].is_number());
+}
+
+#[test]
+fn nothing_but_bad_images_exits_with_3() {
+    let dive = Dive::new();
+    std::fs::create_dir(dive.path("frames/none")).unwrap();
+    std::fs::write(dive.path("frames/none/1.jpg"), "dear diary").unwrap();
+    dive.write("dive.toml", "[[camera]]\nimages = \"frames/none\"\n");
+    let (code, message) = dive.fails(&["run"]);
+    assert_eq!(code, 3);
+    assert!(message.contains("none of the 1 images can be used") && message.contains("C1/1.jpg"), "{message}");
+}
+
+#[test]
+fn a_folder_of_someone_else_is_left_alone() {
+    let dive = Dive::new();
+    dive.write("dive.toml", TWO);
+    std::fs::create_dir_all(dive.path("out/masks")).unwrap();
+    dive.write("out/masks/mine.png", "mine");
+    let (code, message) = dive.fails(&["run"]);
+    assert_eq!(code, 1);
+    assert!(message.contains("was not written by sfm"), "{message}");
+    assert_eq!(std::fs::read(dive.path("out/masks/mine.png")).unwrap(), b"mine");
+}
+
+#[test]
+fn the_same_dive_gives_the_same_bytes_anywhere() {
+    let (one, two) = (Dive::new(), Dive::new());
+    one.write("dive.toml", TWO);
+    two.write("dive.toml", &format!("{TWO}[dive]\noutput = \"elsewhere/results\"\n"));
+    one.ok(&["run", "--threads", "1", "--until", "ingest"]);
+    two.ok(&["run", "--threads", "2", "--until", "ingest"]);
+    let (one, two) = (tree(&one.path("out")), tree(&two.path("elsewhere/results")));
+    assert!(one.len() >= 3, "{:?}", one.keys());
+    assert_eq!(one, two);
+}
+
+#[test]
+fn help_explains_every_key_of_the_report() {
+    let dive = Dive::new();
+    dive.write("dive.toml", TWO);
+    let report: serde_json::Value = serde_json::from_str(&dive.ok(&["run", "--until", "ingest", "--json"])).unwrap();
+    let help = dive.ok(&["help", "json"]);
+    let known: Vec<&str> = help.lines().filter_map(|l| l.split_whitespace().next()).collect();
+    let mut keys = Vec::new();
+    collect_keys(&report, "", &mut keys);
+    for key in keys {
+        assert!(known.contains(&key.as_str()), "{key} is not explained");
+    }
+}
+
+/// Paths of the leaves; names of stages are `*`.
+fn collect_keys(value: &serde_json::Value, path: &str, keys: &mut Vec<String>) {
+    match value {
+        serde_json::Value::Object(map) => {
+            for (name, below) in map {
+                let name = if path == "stages" { "*" } else { name };
+                collect_keys(below, &if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }, keys);
+            }
+        }
+        serde_json::Value::Array(items) if items.iter().any(serde_json::Value::is_object) => {
+            items.iter().for_each(|item| collect_keys(item, &format!("{path}[]"), keys));
+        }
+        serde_json::Value::Array(_) if path == "warnings" => {}
+        _ => keys.push(path.to_owned()),
+    }
+}
