@@ -99,3 +99,67 @@ pub fn assert_near(found: &Reconstruction, truth: &Reconstruction, tolerances: &
         tolerances.rotation_rad
     );
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::survey::{SurveyOptions, survey};
+    use nalgebra::UnitQuaternion;
+    use scene::Rigid3;
+
+    const TIGHT: Tolerances = Tolerances { missing_images: 0, centre: 1e-9, rotation_rad: 1e-7 };
+
+    fn truth() -> Reconstruction {
+        survey(&SurveyOptions { exposures: 6, cameras: 2, points: 10, ..SurveyOptions::default() }).truth
+    }
+
+    /// The same scene in another world: the frames and the rig move, the points do not matter.
+    fn moved(truth: &Reconstruction, scale: f64) -> Reconstruction {
+        let rotation = UnitQuaternion::from_euler_angles(0.4, -1.0, 2.5);
+        let world = Similarity3 { scale, rotation, translation: Vector3::new(3.0, -5.0, 8.0) };
+        let mut out = truth.clone();
+        for frame in &mut out.frames {
+            frame.rig_from_world = frame.rig_from_world.map(|pose| pose.in_new_world(&world));
+        }
+        for sensor in &mut out.rigs[0].sensors {
+            sensor.cam_from_rig.translation *= scale;
+        }
+        out
+    }
+
+    #[test]
+    fn another_world_is_near_up_to_its_freedom() {
+        let truth = truth();
+        assert_near(&moved(&truth, 1.0), &truth, &TIGHT, Alignment::Se3);
+        let scaled = moved(&truth, 0.25);
+        assert_near(&scaled, &truth, &TIGHT, Alignment::Sim3);
+        let rigid = deviation(&scaled, &truth, Alignment::Se3).expect("enough images");
+        assert!((rigid.scale - 4.0).abs() < 1e-9 && rigid.max_centre.0 > 0.5, "{rigid:?}");
+    }
+
+    #[test]
+    fn each_fault_is_told_with_its_image() {
+        let truth = truth();
+        let mut turned = moved(&truth, 1.0);
+        let pose = turned.frames[3].rig_from_world.expect("oriented");
+        let turn = Rigid3::new(UnitQuaternion::from_scaled_axis(Vector3::x() * 0.02), Vector3::zeros());
+        turned.frames[3].rig_from_world = Some(turn * pose);
+        let d = deviation(&turned, &truth, Alignment::Se3).expect("enough images");
+        // The alignment of the centres hardly follows one camera of twelve that swings by 1 cm.
+        assert!((d.max_rotation_rad.0 - 0.02).abs() < 2e-3 && d.max_rotation_rad.1.ends_with("0003.png"), "{d:?}");
+        let mut without = truth.clone();
+        without.frames[2].rig_from_world = None;
+        assert_eq!(deviation(&without, &truth, Alignment::Se3).expect("enough images").missing, ["C1/0002.png", "C2/0002.png"]);
+        without.frames.iter_mut().skip(1).for_each(|f| f.rig_from_world = None);
+        assert_eq!(deviation(&without, &truth, Alignment::Se3), None);
+    }
+
+    #[test]
+    #[should_panic(expected = "missing")]
+    fn a_missing_image_fails() {
+        let truth = truth();
+        let mut without = truth.clone();
+        without.frames[2].rig_from_world = None;
+        assert_near(&without, &truth, &TIGHT, Alignment::Se3);
+    }
+}

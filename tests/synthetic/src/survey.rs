@@ -197,6 +197,23 @@ mod tests {
     }
 
     #[test]
+    fn noise_and_wrong_matches_are_as_many_as_asked_for() {
+        let clean = SurveyOptions { exposures: 4, points: 1000, ..SurveyOptions::default() };
+        let made = survey(&SurveyOptions { noise_px: 0.5, outlier_share: 0.25, ..clean.clone() });
+        // Noise along x and y: the root mean square distance is sqrt 2 of it, to 5 % with some thousand observations.
+        let expected = 0.5 * 2f64.sqrt();
+        assert!((made.truth.reprojection_rms() / expected - 1.0).abs() < 0.05, "{}", made.truth.reprojection_rms());
+        let mut shown = made.truth.keypoints.iter().map(|k| vec![false; k.len()]).collect::<Vec<_>>();
+        for o in made.truth.points.iter().flat_map(|p| &p.track) {
+            shown[o.image.index()][o.keypoint.index()] = true;
+        }
+        for pair in &made.pairs {
+            let right = pair.matches.iter().filter(|(a, _)| shown[pair.images.0.index()][a.index()]).count();
+            assert_eq!(pair.matches.len() - right, right / 4);
+        }
+    }
+
+    #[test]
     fn right_matches_satisfy_the_epipolar_constraint() {
         let made = survey(&SurveyOptions { exposures: 4, points: 300, ..SurveyOptions::default() });
         for pair in &made.pairs {

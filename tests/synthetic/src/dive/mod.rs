@@ -6,6 +6,7 @@ mod path;
 mod render;
 mod surface;
 mod texture;
+mod truth;
 mod water;
 
 pub use optics::Optics;

@@ -1,0 +1,55 @@
+//! The truth of a dive as a reconstruction.
+
+use super::render::Dive;
+use scene::{CameraId, Frame, FrameId, Image, Reconstruction, Rig, RigId, RigSensor, Scale};
+
+impl Dive {
+    /// Name of a frame: `C1/0000` for the first camera and exposure, and `extension` after a dot.
+    #[must_use]
+    pub fn name(camera: usize, exposure: usize, extension: &str) -> String {
+        format!("C{}/{exposure:04}.{extension}", camera + 1)
+    }
+
+    /// True cameras, rig and poses, in metres, without points; images are named as by [`Dive::name`]. What
+    /// [`crate::assert_near`] compares with.
+    #[must_use]
+    pub fn truth(&self, extension: &str) -> Reconstruction {
+        let sensors = self.cam_from_rig.iter().enumerate();
+        let rig = Rig { sensors: sensors.map(|(c, &cam_from_rig)| RigSensor { camera: CameraId::new(c), cam_from_rig }).collect() };
+        let poses = self.rig_from_world.iter().enumerate();
+        let frames = poses.map(|(e, &pose)| Frame { rig: RigId(0), exposure: e as u32, rig_from_world: Some(pose) }).collect();
+        let images = self.images.iter().map(|image| Image {
+            name: Self::name(image.camera, image.exposure, extension),
+            camera: CameraId::new(image.camera),
+            frame: FrameId::new(image.exposure),
+        });
+        Reconstruction {
+            cameras: self.cameras.clone(),
+            rigs: vec![rig],
+            frames,
+            images: images.collect(),
+            keypoints: vec![Vec::new(); self.images.len()],
+            points: Vec::new(),
+            scale: Scale::Metric,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{DiveOptions, render_dive};
+    use scene::ImageId;
+
+    #[test]
+    fn truth_holds_every_frame_at_the_given_baseline() {
+        let dive = render_dive(&DiveOptions { exposures: 3, width: 16, height: 10, ..DiveOptions::default() });
+        let truth = dive.truth("png");
+        assert_eq!(truth.oriented_images().count(), 6);
+        assert_eq!((truth.images[0].name.as_str(), truth.images[5].name.as_str()), ("C1/0000.png", "C2/0002.png"));
+        let centre = |i| truth.cam_from_world(ImageId(i)).expect("oriented").centre();
+        for exposure in 0..3 {
+            // |(0.3998, 0.006, 0.0105)| of the rig's second camera.
+            assert!(((centre(exposure) - centre(3 + exposure)).norm() - 0.4).abs() < 1e-4);
+        }
+    }
+}
