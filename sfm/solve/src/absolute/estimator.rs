@@ -2,7 +2,7 @@
 
 use super::p3p::p3p;
 use super::refinement::{Movable, refine_with_loss};
-use crate::numeric::minimise::{Normal, levenberg_marquardt};
+use crate::numeric::minimise::{COARSE, Normal, levenberg_marquardt};
 use crate::ransac::{Estimator, GroupedSampler, Msac, Ransac, RansacOptions, run};
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 use scene::{Camera, Rigid3};
@@ -248,7 +248,7 @@ impl Estimator for PoseEstimator {
             }
             Some(normal)
         };
-        let refined = levenberg_marquardt(&model.rigid(), MAX_STEPS, linearise, Movable::moved);
+        let refined = levenberg_marquardt(&model.rigid(), MAX_STEPS, COARSE, linearise, Movable::moved);
         Some(Pose::of(&refined))
     }
 }

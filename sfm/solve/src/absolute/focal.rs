@@ -2,7 +2,7 @@
 
 use super::estimator::{Correspondence, Sensor, estimate_absolute_pose, true_inliers};
 use super::refinement::Movable;
-use crate::numeric::minimise::{Normal, levenberg_marquardt};
+use crate::numeric::minimise::{FINE, Normal, levenberg_marquardt};
 use crate::ransac::{Msac, Ransac, RansacOptions, Scoring};
 use nalgebra::{SVector, Vector2, Vector3};
 use scene::camera::ParamKind;
@@ -45,7 +45,7 @@ pub fn estimate_absolute_pose_and_focal(
     let retract = |(pose, focal_px): &(Rigid3, f64), step: &SVector<f64, 7>| {
         (pose.moved(&step.fixed_rows::<6>(0).into_owned()), focal_px * step[6].clamp(-1.0, 1.0).exp())
     };
-    let model = levenberg_marquardt(&start, MAX_STEPS, linearise, retract);
+    let model = levenberg_marquardt(&start, MAX_STEPS, FINE, linearise, retract);
     let inliers = true_inliers(&[sensor(model.1)], &correspondences, &model.0, o.max_error);
     (inliers.len() >= 4).then_some(Ransac { model, inliers, iterations: found.iterations })
 }
@@ -88,4 +88,35 @@ fn linearised(camera: &Camera, pose: &Rigid3, correspondences: &[Correspondence]
         normal.cost += r.norm_squared();
     }
     normal.cost.is_finite().then_some(normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+    use scene::CameraModel;
+
+    #[test]
+    fn gradient_is_half_the_slope_of_the_cost() {
+        let params = [1100.0, 1150.0, 955.0, 610.0, -0.2, 0.05, 0.001, -0.002];
+        let camera = Camera::new(CameraModel::OpenCv, 1920, 1200, &params).unwrap();
+        let pose = Rigid3::new(UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -0.2, 0.3)), Vector3::new(0.2, 0.1, 0.5));
+        let correspondences: Vec<Correspondence> = [(0.5, -0.4, 3.0), (-0.6, 0.2, 4.0), (0.1, 0.5, 2.0)]
+            .into_iter()
+            .map(|(x, y, z)| Correspondence { sensor: 0, pixel: Vector2::new(900.0, 700.0), x_in_world: Vector3::new(x, y, z) })
+            .collect();
+        let at = |step: &SVector<f64, 7>| {
+            let focal_px = 1125.0 * step[6].exp();
+            let moved = pose.moved(&step.fixed_rows::<6>(0).into_owned());
+            linearised(&with_focal(&camera, focal_px), &moved, &correspondences, 1e9).unwrap()
+        };
+        let gradient = at(&SVector::zeros()).gradient;
+        for k in 0..7 {
+            let mut step = SVector::<f64, 7>::zeros();
+            step[k] = 1e-6;
+            let slope = (at(&step).cost - at(&-step).cost) / 2e-6;
+            // The cost is of size 1e6 px^2: differences keep five digits.
+            assert!((slope / 2.0 - gradient[k]).abs() < 1e-5 * gradient.norm(), "{k}: {slope} {}", gradient[k]);
+        }
+    }
 }

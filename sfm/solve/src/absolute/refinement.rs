@@ -1,7 +1,7 @@
 //! Nonlinear refinement of an absolute pose on pixel errors.
 
 use super::estimator::{Correspondence, Sensor};
-use crate::numeric::minimise::{Normal, levenberg_marquardt};
+use crate::numeric::minimise::{FINE, Normal, levenberg_marquardt};
 use nalgebra::{Matrix2x3, SVector, UnitQuaternion, Vector3};
 use scene::Rigid3;
 
@@ -59,7 +59,7 @@ pub(super) fn refine_with_loss(
         }
         Some(normal)
     };
-    levenberg_marquardt(initial, MAX_STEPS, linearise, Movable::moved)
+    levenberg_marquardt(initial, MAX_STEPS, FINE, linearise, Movable::moved)
 }
 
 /// Small motions of a pose: `x_in_rig` becomes `exp(w) x_in_rig + v` for the step (w, v).

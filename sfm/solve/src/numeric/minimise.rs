@@ -2,6 +2,11 @@
 
 use nalgebra::{SMatrix, SVector};
 
+/// Tolerance for a result that is handed out.
+pub(crate) const FINE: f64 = 1e-12;
+/// Tolerance inside a search: parameters are then within about a thousandth of their standard deviation.
+pub(crate) const COARSE: f64 = 1e-6;
+
 /// Normal equations of a sum of squared (weighted) residuals at one point.
 #[derive(Clone, Debug)]
 pub(crate) struct Normal<const N: usize> {
@@ -37,10 +42,11 @@ impl<const N: usize> Normal<N> {
 /// Levenberg's damping is scaled by the diagonal (Marquardt, SIAM J. Appl. Math. 1963) and kept above a share of its mean, which also
 /// carries a gauge freedom in the parameters. `linearise` gives the lower triangle of the normal equations and the cost
 /// of a model, or `None` where the model is impossible; `retract` applies a step. Ends after `max_steps` trials, when the cost
-/// falls by less than 1e-12 of itself, or when no damping helps.
+/// falls by less than `tolerance` of itself, or when no damping helps.
 pub(crate) fn levenberg_marquardt<M: Clone, const N: usize>(
     initial: &M,
     max_steps: usize,
+    tolerance: f64,
     linearise: impl Fn(&M) -> Option<Normal<N>>,
     retract: impl Fn(&M, &SVector<f64, N>) -> M,
 ) -> M {
@@ -59,7 +65,7 @@ pub(crate) fn levenberg_marquardt<M: Clone, const N: usize>(
         let next = candidate.and_then(|m| linearise(&m).map(|n| (m, n))).filter(|(_, n)| n.cost < normal.cost);
         match next {
             Some((next_model, next_normal)) => {
-                let converged = normal.cost - next_normal.cost <= 1e-12 * normal.cost;
+                let converged = normal.cost - next_normal.cost <= tolerance * normal.cost;
                 (model, normal) = (next_model, next_normal);
                 if converged {
                     break;
@@ -88,15 +94,15 @@ mod tests {
 
     #[test]
     fn curved_valley_is_followed_to_its_end() {
-        let x = levenberg_marquardt(&SVector::from([-1.2, 1.0]), 100, rosenbrock, |x, d| x + d);
+        let x = levenberg_marquardt(&SVector::from([-1.2, 1.0]), 100, 1e-12, rosenbrock, |x, d| x + d);
         assert!((x - SVector::from([1.0, 1.0])).norm() < 1e-10, "{x}");
     }
 
     #[test]
     fn impossible_start_is_given_back() {
         let start = SVector::from([5.0, 5.0]);
-        assert_eq!(levenberg_marquardt(&start, 10, |_| None, |x: &SVector<f64, 2>, d| x + d), start);
+        assert_eq!(levenberg_marquardt(&start, 10, 1e-12, |_| None, |x: &SVector<f64, 2>, d| x + d), start);
         let nan = |_: &SVector<f64, 2>| Some(Normal { cost: f64::NAN, ..Normal::<2>::zero() });
-        assert_eq!(levenberg_marquardt(&start, 10, nan, |x, d| x + d), start);
+        assert_eq!(levenberg_marquardt(&start, 10, 1e-12, nan, |x, d| x + d), start);
     }
 }

@@ -128,11 +128,13 @@ pub fn run<E: Estimator>(
             needed = iterations_needed(options, sampler.success_probability(&inliers, size));
         }
     }
+    let mut previous = Vec::new();
     for _ in 0..FINAL_ROUNDS {
         search.inliers(options.max_error, &mut inliers);
-        if !search.refine_on(&inliers, options.max_error) {
+        if inliers == previous || !search.refine_on(&inliers, options.max_error) {
             break;
         }
+        std::mem::swap(&mut previous, &mut inliers);
     }
     search.inliers(options.max_error, &mut inliers);
     if inliers.len() < size {

@@ -9,6 +9,8 @@
 mod engine;
 mod sampler;
 mod scoring;
+#[cfg(test)]
+mod tests;
 
 pub use engine::{Estimator, Ransac, RansacOptions, run};
 pub use sampler::{GroupedSampler, Sampler, UniformSampler};

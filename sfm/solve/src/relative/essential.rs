@@ -4,7 +4,7 @@ use super::five_point::five_point;
 use super::matches::Matches;
 use super::pose::{decompose, tangent};
 use super::sampson;
-use crate::numeric::minimise::levenberg_marquardt;
+use crate::numeric::minimise::{COARSE, FINE, levenberg_marquardt};
 use crate::ransac::{Estimator, Msac, Ransac, RansacOptions, UniformSampler, run};
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector2, Vector3};
 use scene::Rigid3;
@@ -47,7 +47,7 @@ pub fn refine_relative_pose(initial: &Rigid3, x1: &[Vector2<f64>], x2: &[Vector2
     }
     let matches = Matches::new(x1, x2);
     let motion = Motion { rotation: initial.rotation, t: initial.translation / norm };
-    let refined = motion.refined(&matches, || 0..matches.len(), max_error);
+    let refined = motion.refined(&matches, || 0..matches.len(), max_error, FINE);
     Rigid3::new(refined.rotation, refined.t)
 }
 
@@ -80,12 +80,12 @@ impl Motion {
         Self { rotation, t: (self.t + b[0] * step[3] + b[1] * step[4]).normalize() }
     }
 
-    fn refined<I: Iterator<Item = usize>>(&self, matches: &Matches, indices: impl Fn() -> I, max_error: f64) -> Self {
+    fn refined<I: Iterator<Item = usize>>(&self, matches: &Matches, indices: impl Fn() -> I, max_error: f64, tolerance: f64) -> Self {
         let linearise = |m: &Motion| {
             let (e, basis) = m.linearised();
             Some(sampson::normal_equations(&e, &basis, matches, indices(), max_error))
         };
-        levenberg_marquardt(self, MAX_STEPS, linearise, Motion::moved)
+        levenberg_marquardt(self, MAX_STEPS, tolerance, linearise, Motion::moved)
     }
 }
 
@@ -116,7 +116,7 @@ impl Estimator for EssentialEstimator {
     fn refine(&self, model: &Matrix3<f64>, inliers: &[usize], max_error: f64) -> Option<Matrix3<f64>> {
         // Any of the four decompositions has the same epipolar geometry.
         let (rotation, _, t) = decompose(model).filter(|_| inliers.len() >= 5)?;
-        Some(Motion { rotation, t }.refined(&self.matches, || inliers.iter().copied(), max_error).essential())
+        Some(Motion { rotation, t }.refined(&self.matches, || inliers.iter().copied(), max_error, COARSE).essential())
     }
 }
 

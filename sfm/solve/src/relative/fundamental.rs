@@ -3,7 +3,7 @@
 use super::matches::Matches;
 use super::sampson;
 use super::seven_point::seven_point;
-use crate::numeric::minimise::levenberg_marquardt;
+use crate::numeric::minimise::{COARSE, levenberg_marquardt};
 use crate::ransac::{Estimator, Msac, Ransac, RansacOptions, UniformSampler, run};
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
 
@@ -146,7 +146,7 @@ impl Estimator for FundamentalEstimator {
             Some(linear) if cost(&linear) < cost(&current) => linear,
             _ => current,
         };
-        let f = levenberg_marquardt(&start, MAX_STEPS, linearise, Factors::moved).matrix();
+        let f = levenberg_marquardt(&start, MAX_STEPS, COARSE, linearise, Factors::moved).matrix();
         Some(f / f.norm())
     }
 }

@@ -2,7 +2,7 @@
 
 use super::homography::Both;
 use super::matches::Matches;
-use crate::numeric::minimise::{Normal, levenberg_marquardt};
+use crate::numeric::minimise::{COARSE, Normal, levenberg_marquardt};
 use nalgebra::{Matrix3, SVector, Vector2, Vector3};
 
 /// Trials of one refinement.
@@ -37,7 +37,7 @@ pub(super) fn refined(model: &Both, matches: &Matches, inliers: &[usize], max_er
         Some(normal)
     };
     // A step that makes H singular keeps the model: its cost is not lower, and the damping grows.
-    levenberg_marquardt(model, MAX_STEPS, linearise, |m, step| moved(m, step).unwrap_or_else(|| m.clone()))
+    levenberg_marquardt(model, MAX_STEPS, COARSE, linearise, |m, step| moved(m, step).unwrap_or_else(|| m.clone()))
 }
 
 fn moved(model: &Both, step: &SVector<f64, 9>) -> Option<Both> {

@@ -8,7 +8,7 @@ const MIN_ANGLE_RAD: f64 = 1e-5;
 /// Gauss-Newton steps: two or three are usual.
 const MAX_STEPS: usize = 10;
 /// A step below this share of the distance to the nearest camera ends the iteration.
-const STEP_TOLERANCE: f64 = 1e-10;
+const STEP_TOLERANCE: f64 = 1e-8;
 
 /// Angle in radians at `x` between the directions to two projection centres; 0 where `x` is one of them.
 #[must_use]
@@ -83,39 +83,53 @@ pub(super) fn nearest_to_rays<'a>(views: impl Iterator<Item = &'a View> + Clone)
 }
 
 /// Gauss-Newton on the pixel errors; `None` when the start does not project into every view.
+///
+/// Each trial costs one projection with derivatives a view, whether it is accepted or not.
 pub(super) fn refine_point<'a>(views: impl Iterator<Item = &'a View> + Clone, start: &Vector3<f64>) -> Option<Vector3<f64>> {
     let mut x = *start;
-    let mut cost: f64 = views.clone().map(|v| v.squared_error(&x)).sum();
-    if !cost.is_finite() {
-        return None;
-    }
+    let mut normal = normal_equations(views.clone(), &x)?;
+    let nearest = views.clone().map(|v| (x - v.centre()).norm_squared()).fold(f64::INFINITY, f64::min);
+    let mut step = normal.step();
     for _ in 0..MAX_STEPS {
-        let mut hessian = Matrix3::zeros();
-        let mut gradient = Vector3::zeros();
-        let mut nearest = f64::INFINITY;
-        for view in views.clone() {
-            let projected = view.project_with_jacobians(&x)?;
-            let j = projected.d_point * view.rotation();
-            hessian += j.transpose() * j;
-            gradient += j.tr_mul(&(projected.pixel - view.pixel()));
-            nearest = nearest.min((x - view.centre()).norm_squared());
-        }
-        let Some(factor) = hessian.cholesky() else {
+        if step.norm_squared() <= STEP_TOLERANCE * STEP_TOLERANCE * nearest {
             break;
-        };
-        let mut step = -factor.solve(&gradient);
-        let mut improved = false;
-        for _ in 0..4 {
-            let candidate_cost: f64 = views.clone().map(|v| v.squared_error(&(x + step))).sum();
-            if candidate_cost < cost {
-                (x, cost, improved) = (x + step, candidate_cost, true);
-                break;
+        }
+        let candidate = x + step;
+        match normal_equations(views.clone(), &candidate).filter(|n| n.cost < normal.cost) {
+            Some(next) => {
+                x = candidate;
+                normal = next;
+                step = normal.step();
             }
-            step *= 0.5;
-        }
-        if !improved || step.norm_squared() < STEP_TOLERANCE * STEP_TOLERANCE * nearest {
-            break;
+            None => step *= 0.5,
         }
     }
     Some(x)
+}
+
+struct PointNormal {
+    hessian: Matrix3<f64>,
+    gradient: Vector3<f64>,
+    cost: f64,
+}
+
+impl PointNormal {
+    /// The step of Gauss and Newton; zero where the point is not determined.
+    fn step(&self) -> Vector3<f64> {
+        self.hessian.cholesky().map_or_else(Vector3::zeros, |factor| -factor.solve(&self.gradient))
+    }
+}
+
+/// `None` when the point does not project into every view.
+fn normal_equations<'a>(views: impl Iterator<Item = &'a View>, x: &Vector3<f64>) -> Option<PointNormal> {
+    let mut out = PointNormal { hessian: Matrix3::zeros(), gradient: Vector3::zeros(), cost: 0.0 };
+    for view in views {
+        let projected = view.project_with_jacobians(x)?;
+        let j = projected.d_point * view.rotation();
+        let r = projected.pixel - view.pixel();
+        out.hessian += j.transpose() * j;
+        out.gradient += j.tr_mul(&r);
+        out.cost += r.norm_squared();
+    }
+    out.cost.is_finite().then_some(out)
 }
