@@ -10,6 +10,9 @@ use std::collections::BTreeMap;
 #[must_use]
 pub fn report(config: &Config, done: &BTreeMap<&'static str, Stamp>) -> Value {
     let figure = |stage: &str, key: &str| done.get(stage).and_then(|s| s.figures.get(key)).cloned().unwrap_or_default();
+    let part = |stage: &str, keys: &[&str]| -> Value {
+        keys.iter().map(|key| ((*key).to_owned(), figure(stage, key))).collect::<Map<String, Value>>().into()
+    };
     let warnings: Vec<Value> = crate::recipe::RECIPE
         .iter()
         .filter_map(|stage| Some((stage.name, done.get(stage.name)?)))
@@ -21,6 +24,7 @@ pub fn report(config: &Config, done: &BTreeMap<&'static str, Stamp>) -> Value {
         "images": {"found": figure("ingest", "found"), "total": figure("ingest", "usable"), "oriented": figure("orient", "oriented")},
         "frames": {"total": figure("ingest", "frames")},
         "cameras": figure("ingest", "cameras"),
+        "masks": part("mask", &["strategy", "masks", "empty", "masked_ratio"]),
         "warnings": warnings,
     })
 }

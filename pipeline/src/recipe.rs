@@ -1,10 +1,12 @@
 //! The way from photographs to measurements, station by station.
 
 use crate::stage::Stage;
-use crate::stages::ingest;
+use crate::stages::{ingest, mask};
 
 /// The stations, in order. Each says below what it builds on; `sfm status` shows where a dive stands.
 pub const RECIPE: &[&Stage] = &[
     // Which images are there, and which were exposed at the same instant?
     &ingest::STAGE,
+    // Which pixels show structure, and which only water?
+    &mask::STAGE,
 ];

@@ -189,6 +189,47 @@ fn the_same_dive_gives_the_same_bytes_anywhere() {
     assert_eq!(one, two);
 }
 
+/// A unit square in the plane z = 0, and points 1 and 3 mm above it: the mean is 2 mm.
+#[test]
+fn eval_measures_a_cloud() {
+    let dive = Dive::new();
+    let header = |vertices: usize, rest: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n{rest}end_header\n"
+        )
+    };
+    let faces = "element face 2\nproperty list uchar int vertex_indices\n";
+    dive.write("mesh.ply", &(header(4, faces) + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"));
+    dive.write("cloud.ply", &(header(2, "") + "0.25 0.25 0.001\n0.75 0.75 0.003\n"));
+    let text = dive.ok(&["eval", "cloud.ply", "--reference", "mesh.ply", "--threshold-m", "0.002", "--json"]);
+    let metrics: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!((metrics["c2m_mean_m"].as_f64().unwrap() - 0.002).abs() < 1e-6, "{metrics}");
+    assert!((metrics["snr"].as_f64().unwrap() - 0.5).abs() < 1e-9, "{metrics}");
+    assert!(dive.ok(&["eval", "cloud.ply", "--reference", "mesh.ply", "--gsd-m", "0.001"]).contains("0.002000"));
+    assert_eq!(dive.fails(&["eval", "cloud.ply", "--reference", "mesh.ply"]).0, 2);
+    assert_eq!(dive.fails(&["eval", "none.ply", "--reference", "mesh.ply", "--gsd-m", "1"]).0, 1);
+}
+
+/// Masks from files: kept as 0 and 255, missing ones told, the image's size demanded.
+#[test]
+fn masks_come_from_files() {
+    let dive = Dive::new();
+    std::fs::create_dir(dive.path("masks")).unwrap();
+    let grey = |w: usize, h: usize, f: fn(usize) -> u8| {
+        imaging::encode_png_grey(&scene::Raster::from_vec(w, h, (0..w * h).map(f).collect()).unwrap()).unwrap()
+    };
+    std::fs::write(dive.path("masks/0.png"), grey(64, 48, |i| if i % 4 == 0 { 200 } else { 90 })).unwrap();
+    std::fs::write(dive.path("masks/1.png"), grey(32, 48, |_| 255)).unwrap();
+    dive.write("dive.toml", "[[camera]]\nname = \"L\"\nimages = \"frames/left\"\nmask = \"masks/{stem}.png\"\n");
+    let report: serde_json::Value = serde_json::from_str(&dive.ok(&["run", "--until", "mask", "--json"])).unwrap();
+    let mask = imaging::decode_grey_u8(&std::fs::read(dive.path("out/masks/files/L/0.png")).unwrap()).unwrap();
+    assert!(mask.data().iter().enumerate().all(|(i, v)| *v == if i % 4 == 0 { 255 } else { 0 }));
+    assert!(!dive.path("out/masks/files/L/1.png").exists());
+    let warnings = report["warnings"].to_string();
+    assert!(warnings.contains("32 x 48") && warnings.contains("no mask file"), "{warnings}");
+    assert!((report["masks"]["masked_ratio"].as_f64().unwrap() - 0.75).abs() < 1e-12);
+}
+
 #[test]
 fn help_explains_every_key_of_the_report() {
     let dive = Dive::new();

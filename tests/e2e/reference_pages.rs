@@ -35,9 +35,15 @@ fn examples(page: &str) -> Vec<String> {
 #[test]
 fn the_examples_of_the_page_are_accepted() {
     let folder = tempfile::tempdir().unwrap();
-    for file in
-        ["frames/left/0001.jpg", "frames/left/0002.jpg", "frames/right/0001.jpg", "frames/right/0002.jpg", "port.mp4", "reference.ply"]
-    {
+    for file in [
+        "frames/left/0001.jpg",
+        "frames/left/0002.jpg",
+        "frames/right/0001.jpg",
+        "frames/right/0002.jpg",
+        "port.mp4",
+        "reference.ply",
+        "positions.txt",
+    ] {
         let path = folder.path().join(file);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, "x").unwrap();

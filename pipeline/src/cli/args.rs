@@ -29,6 +29,8 @@ pub enum Command {
     Status(StatusArgs),
     /// Write a commented dive.toml for a folder of images or videos to stdout.
     Init(InitArgs),
+    /// Measure a cloud against a reference in the same frame.
+    Eval(EvalArgs),
     /// Explain a command; `sfm help json` explains the keys of report.json.
     Help(HelpArgs),
 }
@@ -72,6 +74,34 @@ pub struct StatusArgs {
 pub struct InitArgs {
     /// Folder of images, of one folder of images a camera, or of videos.
     pub folder: PathBuf,
+}
+
+/// Arguments of `sfm eval`.
+#[derive(Debug, Args)]
+pub struct EvalArgs {
+    /// The cloud, PLY.
+    pub cloud: PathBuf,
+    /// What it is compared with: a mesh (PLY, OBJ) or a cloud (PLY).
+    #[arg(long, value_name = "FILE")]
+    pub reference: PathBuf,
+    /// Ground sample distance; the threshold is twice it where none is given.
+    #[arg(long, value_name = "METRES")]
+    pub gsd_m: Option<f64>,
+    /// Largest distance of a point that is signal.
+    #[arg(long, value_name = "METRES", required_unless_present = "gsd_m")]
+    pub threshold_m: Option<f64>,
+    /// Radius of the surface density [default: the threshold].
+    #[arg(long, value_name = "METRES")]
+    pub density_radius_m: Option<f64>,
+    /// Cell of the integrity [default: the threshold].
+    #[arg(long, value_name = "METRES")]
+    pub grid_m: Option<f64>,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `sfm help`.

@@ -1,9 +1,10 @@
 //! From the command line to an exit code.
 
 use super::args::{Cli, Command};
-use super::{help, init, run, status};
+use super::{eval, help, init, run, status};
 use crate::config::ConfigError;
 use crate::error::NoResult;
+use anyhow::Context;
 use clap::Parser;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -21,6 +22,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(args),
         Command::Status(args) => status::status(args),
         Command::Init(args) => init::init(args),
+        Command::Eval(args) => eval::eval(args),
         Command::Help(args) => help::help(args),
     };
     match result {
@@ -55,4 +57,10 @@ pub(super) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes())?;
     Ok(out.flush()?)
+}
+
+/// Starts the threads that all work is shared among.
+pub(super) fn start_threads(threads: Option<u16>) -> anyhow::Result<()> {
+    let threads = threads.map_or(0, usize::from);
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")
 }

@@ -2,6 +2,7 @@
 
 mod args;
 mod dispatch;
+mod eval;
 mod help;
 mod init;
 mod keys;

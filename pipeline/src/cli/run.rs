@@ -1,20 +1,19 @@
 //! `sfm run`.
 
 use super::args::RunArgs;
-use super::dispatch::print;
+use super::dispatch::{print, start_threads};
 use super::terminal::Terminal;
 use crate::recipe::RECIPE;
 use crate::run::{Done, Selection};
 use crate::{config, figures};
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 /// Warnings of one stage that are shown; all are in report.json and the log.
 const SHOWN: usize = 5;
 
 pub(super) fn run(args: &RunArgs) -> Result<()> {
     let config = config::read(&args.dive)?;
-    let threads = args.threads.map_or(0, usize::from);
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
+    start_threads(args.threads)?;
     let selection = Selection { from: args.from.clone(), until: args.until.clone(), force: args.force.clone() };
     let terminal = Terminal::new();
     let done = crate::run::run(RECIPE, &config, &selection, &terminal);

@@ -8,6 +8,7 @@ mod model;
 mod raw;
 mod resolve;
 mod rig;
+mod stage_options;
 mod stages;
 #[cfg(test)]
 mod tests;
@@ -20,3 +21,4 @@ pub use keys::KEYS;
 pub use model::*;
 pub(crate) use resolve::is_safe_name;
 pub use resolve::{parse, read};
+pub use stage_options::*;

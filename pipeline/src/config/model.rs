@@ -1,5 +1,6 @@
 //! The configuration as resolved: every default filled in, every value checked.
 
+use super::stage_options::{DensifyConfig, EvaluateConfig, FeaturesConfig, MaskConfig, MatchingConfig, OrientConfig};
 use scene::{CameraModel, Rigid3};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -27,6 +28,10 @@ pub struct Config {
     pub features: FeaturesConfig,
     /// Options of the stage `matching`.
     pub matching: MatchingConfig,
+    /// Options of the stage `orient`.
+    pub orient: OrientConfig,
+    /// Options of the stage `densify`.
+    pub densify: DensifyConfig,
     /// Options of the stage `evaluate`.
     pub evaluate: EvaluateConfig,
 }
@@ -174,68 +179,4 @@ pub struct PickConfig {
     pub x: f64,
     /// Row, pixels.
     pub y: f64,
-}
-
-/// How masks are made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum MaskStrategy {
-    /// Every pixel takes part.
-    None,
-    /// Masks are read from files.
-    Files,
-    /// Masks are made by image processing.
-    Ip,
-}
-
-impl MaskStrategy {
-    /// The name in dive.toml and in `out/masks/<strategy>`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Files => "files",
-            Self::Ip => "ip",
-        }
-    }
-}
-
-/// Options of the stage `mask`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MaskConfig {
-    /// How masks are made.
-    pub strategy: MaskStrategy,
-}
-
-/// Options of the stage `features`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FeaturesConfig {
-    /// Most keypoints an image.
-    pub max_keypoints: u32,
-}
-
-/// Which pairs of images are matched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PairRule {
-    /// Exhaustive up to 200 images, sequential above.
-    Auto,
-    /// All pairs.
-    Exhaustive,
-    /// Neighbours in time, and loop candidates.
-    Sequential,
-}
-
-/// Options of the stage `matching`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MatchingConfig {
-    /// Which pairs are matched.
-    pub pairs: PairRule,
-}
-
-/// Options of the stage `evaluate`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EvaluateConfig {
-    /// What the cloud is compared with.
-    pub reference: Option<PathBuf>,
 }

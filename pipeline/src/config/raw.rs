@@ -115,32 +115,69 @@ pub(super) struct RawPick {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawMask {
     pub(super) strategy: Place<String>,
+    pub(super) polarity: Place<String>,
+    pub(super) channel: Place<String>,
+    pub(super) working_long_side_px: Place<u32>,
+    pub(super) blur_sigma_px: Place<f64>,
+    pub(super) canny_low: Place<f64>,
+    pub(super) canny_high: Place<f64>,
+    pub(super) closing_radius: Place<f64>,
+    pub(super) min_structure_area: Place<f64>,
+    pub(super) min_hole_area: Place<f64>,
+    pub(super) min_textured_share: Place<f64>,
+    pub(super) reach: Place<f64>,
+    pub(super) min_texture: Place<f64>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawFeatures {
     pub(super) max_keypoints: Place<u32>,
+    pub(super) double_image: Place<bool>,
+    pub(super) contrast_threshold: Place<f64>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawMatching {
     pub(super) pairs: Place<String>,
+    pub(super) exhaustive_up_to: Place<u32>,
+    pub(super) overlap: Place<u32>,
+    pub(super) ratio: Place<f64>,
+    pub(super) max_error_px: Place<f64>,
+    pub(super) min_inliers: Place<u32>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub(super) struct RawOrient {}
+pub(super) struct RawOrient {
+    pub(super) initial_min_inliers: Place<u32>,
+    pub(super) initial_min_angle_deg: Place<f64>,
+    pub(super) register_max_error_px: Place<f64>,
+    pub(super) register_min_inliers: Place<u32>,
+    pub(super) max_error_px: Place<f64>,
+    pub(super) min_angle_deg: Place<f64>,
+    pub(super) refine_principal_point: Place<bool>,
+    pub(super) seed: Place<u32>,
+}
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub(super) struct RawDensify {}
+pub(super) struct RawDensify {
+    pub(super) quality: Place<String>,
+    pub(super) max_views: Place<u32>,
+    pub(super) min_views: Place<u32>,
+    pub(super) seed: Place<u32>,
+}
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawEvaluate {
     pub(super) reference: Place<String>,
+    pub(super) positions: Place<String>,
+    pub(super) threshold_m: Place<f64>,
+    pub(super) density_radius_m: Place<f64>,
+    pub(super) grid_m: Place<f64>,
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -103,6 +103,8 @@ fn resolve(source: &mut Source<'_>, raw: &RawConfig, file: &Path) -> Config {
         mask: stages::mask(source, &raw.mask, &cameras),
         features: stages::features(source, &raw.features),
         matching: stages::matching(source, &raw.matching),
+        orient: stages::orient(source, &raw.orient),
+        densify: stages::densify(source, &raw.densify),
         evaluate: stages::evaluate(source, &raw.evaluate, folder),
         cameras,
     }

@@ -1,10 +1,15 @@
 //! The sections of the stages.
 
 use super::error::Source;
-use super::model::{CameraConfig, EvaluateConfig, FeaturesConfig, MaskConfig, MaskStrategy, MatchingConfig, PairRule};
-use super::raw::{RawEvaluate, RawFeatures, RawMask, RawMatching};
+use super::model::CameraConfig;
+use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient};
+use super::stage_options::{
+    DenseQuality, DensifyConfig, EvaluateConfig, FeaturesConfig, IpConfig, MaskConfig, MaskStrategy, MatchingConfig, OrientConfig,
+    PairRule, Polarity,
+};
 use super::values::Values;
 use std::path::Path;
+use toml::Spanned;
 
 pub(super) fn mask(source: &mut Source<'_>, raw: &RawMask, cameras: &[CameraConfig]) -> MaskConfig {
     let mut values = Values { source };
@@ -16,27 +21,115 @@ pub(super) fn mask(source: &mut Source<'_>, raw: &RawMask, cameras: &[CameraConf
         let hint = "add `mask = \"masks/{stem}.png\"` to a [[camera]]";
         values.problem_with_hint(place.span(), "mask.strategy", "no camera names its mask files", hint);
     }
-    MaskConfig { strategy }
+    MaskConfig { strategy, ip: ip(&mut values, raw) }
+}
+
+fn ip(values: &mut Values<'_, '_>, raw: &RawMask) -> IpConfig {
+    let default = masking::IpOptions::default();
+    let polarities = [("auto", Polarity::Auto), ("dark", Polarity::Dark), ("bright", Polarity::Bright)];
+    let channels = [("red", 0), ("green", 1), ("blue", 2)];
+    let mut share = |key: &str, value, default| values.within(key, value, 0.0, 1.0, default);
+    let closing_radius = share("mask.closing_radius", &raw.closing_radius, default.closing_radius);
+    let min_structure_area = share("mask.min_structure_area", &raw.min_structure_area, default.min_structure_area);
+    let min_hole_area = share("mask.min_hole_area", &raw.min_hole_area, default.min_hole_area);
+    let min_textured_share = share("mask.min_textured_share", &raw.min_textured_share, default.min_textured_share);
+    let reach = share("mask.reach", &raw.reach, default.reach);
+    let min_texture = share("mask.min_texture", &raw.min_texture, default.min_texture);
+    let canny_low = values.within("mask.canny_low", &raw.canny_low, 0.0, 255.0, default.canny.low);
+    let canny_high = values.within("mask.canny_high", &raw.canny_high, 0.0, 255.0, default.canny.high);
+    if let (true, Some(place)) = (canny_low > canny_high, raw.canny_low.as_ref().or(raw.canny_high.as_ref())) {
+        values.problem(place.span(), "mask.canny_low", format!("is {canny_low}, above canny_high, {canny_high}"));
+    }
+    IpConfig {
+        polarity: values.choice("mask.polarity", &raw.polarity, &polarities).unwrap_or(Polarity::Auto),
+        channel: values.choice("mask.channel", &raw.channel, &channels).unwrap_or(default.channel as u32),
+        working_long_side_px: values.count(
+            "mask.working_long_side_px",
+            &raw.working_long_side_px,
+            0,
+            100_000,
+            default.working_long_side_px as u32,
+        ),
+        blur_sigma_px: values.within("mask.blur_sigma_px", &raw.blur_sigma_px, 0.0, 10.0, default.blur_sigma_px),
+        canny_low,
+        canny_high,
+        closing_radius,
+        min_structure_area,
+        min_hole_area,
+        min_textured_share,
+        reach,
+        min_texture,
+    }
+}
+
+fn flag(value: &Option<Spanned<bool>>, default: bool) -> bool {
+    value.as_ref().map_or(default, |v| *v.get_ref())
 }
 
 pub(super) fn features(source: &mut Source<'_>, raw: &RawFeatures) -> FeaturesConfig {
     let mut values = Values { source };
-    FeaturesConfig { max_keypoints: values.count("features.max_keypoints", &raw.max_keypoints, 100, 100_000, 8192) }
+    FeaturesConfig {
+        max_keypoints: values.count("features.max_keypoints", &raw.max_keypoints, 100, 100_000, 8192),
+        double_image: flag(&raw.double_image, false),
+        contrast_threshold: values.within("features.contrast_threshold", &raw.contrast_threshold, 0.0, 1.0, 0.02 / 3.0),
+    }
 }
 
 pub(super) fn matching(source: &mut Source<'_>, raw: &RawMatching) -> MatchingConfig {
     let mut values = Values { source };
     let rules = [("auto", PairRule::Auto), ("exhaustive", PairRule::Exhaustive), ("sequential", PairRule::Sequential)];
-    MatchingConfig { pairs: values.choice("matching.pairs", &raw.pairs, &rules).unwrap_or(PairRule::Auto) }
+    MatchingConfig {
+        pairs: values.choice("matching.pairs", &raw.pairs, &rules).unwrap_or(PairRule::Auto),
+        exhaustive_up_to: values.count("matching.exhaustive_up_to", &raw.exhaustive_up_to, 0, 100_000, 200),
+        overlap: values.count("matching.overlap", &raw.overlap, 1, 10_000, 10),
+        ratio: values.within("matching.ratio", &raw.ratio, 0.1, 1.0, 0.8),
+        max_error_px: values.within("matching.max_error_px", &raw.max_error_px, 0.1, 100.0, 4.0),
+        min_inliers: values.count("matching.min_inliers", &raw.min_inliers, 8, 10_000, 15),
+    }
+}
+
+pub(super) fn orient(source: &mut Source<'_>, raw: &RawOrient) -> OrientConfig {
+    let mut values = Values { source };
+    OrientConfig {
+        initial_min_inliers: values.count("orient.initial_min_inliers", &raw.initial_min_inliers, 10, 100_000, 100),
+        initial_min_angle_deg: values.within("orient.initial_min_angle_deg", &raw.initial_min_angle_deg, 0.1, 90.0, 16.0),
+        register_max_error_px: values.within("orient.register_max_error_px", &raw.register_max_error_px, 0.1, 200.0, 12.0),
+        register_min_inliers: values.count("orient.register_min_inliers", &raw.register_min_inliers, 6, 100_000, 30),
+        max_error_px: values.within("orient.max_error_px", &raw.max_error_px, 0.1, 100.0, 4.0),
+        min_angle_deg: values.within("orient.min_angle_deg", &raw.min_angle_deg, 0.0, 45.0, 1.5),
+        refine_principal_point: flag(&raw.refine_principal_point, false),
+        seed: values.count("orient.seed", &raw.seed, 0, u32::MAX, 0),
+    }
+}
+
+pub(super) fn densify(source: &mut Source<'_>, raw: &RawDensify) -> DensifyConfig {
+    let mut values = Values { source };
+    let qualities = [("low", DenseQuality::Low), ("medium", DenseQuality::Medium), ("high", DenseQuality::High)];
+    DensifyConfig {
+        quality: values.choice("densify.quality", &raw.quality, &qualities).unwrap_or(DenseQuality::Medium),
+        max_views: values.count("densify.max_views", &raw.max_views, 1, 100, 8),
+        min_views: values.count("densify.min_views", &raw.min_views, 2, 100, 3),
+        seed: values.count("densify.seed", &raw.seed, 0, u32::MAX, 0),
+    }
 }
 
 pub(super) fn evaluate(source: &mut Source<'_>, raw: &RawEvaluate, folder: &Path) -> EvaluateConfig {
-    let reference = raw.reference.as_ref().map(|place| {
+    let mut file = |key: &str, place: &Option<Spanned<String>>| {
+        let place = place.as_ref()?;
         let path = folder.join(place.get_ref());
         if !path.is_file() {
-            source.problem(Some(place.span()), "evaluate.reference", format!("there is no file {}", path.display()), None);
+            source.problem(Some(place.span()), key, format!("there is no file {}", path.display()), None);
         }
-        path
-    });
-    EvaluateConfig { reference }
+        Some(path)
+    };
+    let reference = file("evaluate.reference", &raw.reference);
+    let positions = file("evaluate.positions", &raw.positions);
+    let mut values = Values { source };
+    EvaluateConfig {
+        reference,
+        positions,
+        threshold_m: values.positive("evaluate.threshold_m", &raw.threshold_m),
+        density_radius_m: values.positive("evaluate.density_radius_m", &raw.density_radius_m),
+        grid_m: values.positive("evaluate.grid_m", &raw.grid_m),
+    }
 }

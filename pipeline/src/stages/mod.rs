@@ -1,5 +1,9 @@
 //! The stages: each loads what it needs, calls an algorithm of another package, and saves what came out.
 
+pub mod densify;
+pub mod evaluate;
 pub mod images;
 pub mod ingest;
+pub mod mask;
+pub mod model;
 mod pairing;
