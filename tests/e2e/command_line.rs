@@ -2,89 +2,15 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-use std::collections::BTreeMap;
-use std::path::Path;
-use std::process::{Command, Output};
+mod support;
 
-struct Dive {
-    folder: tempfile::TempDir,
-}
-
-impl Dive {
-    /// Two cameras of three small images each, below `frames`.
-    fn new() -> Self {
-        let dive = Self { folder: tempfile::tempdir().unwrap() };
-        for (c, camera) in ["left", "right"].iter().enumerate() {
-            std::fs::create_dir_all(dive.path(&format!("frames/{camera}"))).unwrap();
-            for i in 0..3 {
-                std::fs::write(dive.path(&format!("frames/{camera}/{i}.png")), png(64, 48, (10 * c + i) as u32)).unwrap();
-            }
-        }
-        dive
-    }
-
-    fn path(&self, name: &str) -> std::path::PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path(name), text).unwrap();
-    }
-
-    fn sfm(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_sfm")).args(arguments).current_dir(self.folder.path()).output().unwrap()
-    }
-
-    /// The standard output of a call that succeeds.
-    fn ok(&self, arguments: &[&str]) -> String {
-        let output = self.sfm(arguments);
-        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).unwrap()
-    }
-
-    /// Exit code and standard error of a call that fails without a panic.
-    fn fails(&self, arguments: &[&str]) -> (i32, String) {
-        let output = self.sfm(arguments);
-        let stderr = String::from_utf8(output.stderr).unwrap();
-        assert!(!stderr.contains("panicked"), "{stderr}");
-        assert!(output.stdout.is_empty(), "nothing but data belongs on stdout");
-        (output.status.code().unwrap(), stderr)
-    }
-}
-
-/// A grey image of deterministic noise.
-fn png(width: usize, height: usize, seed: u32) -> Vec<u8> {
-    let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(1);
-    let values = std::iter::repeat_with(|| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 24) as u8
-    });
-    imaging::encode_png_grey(&scene::Raster::from_vec(width, height, values.take(width * height).collect()).unwrap()).unwrap()
-}
+use support::{Dive, png, tree};
 
 const TWO: &str = "[[camera]]\nname = \"L\"\nimages = \"frames/left\"\n[[camera]]\nname = \"R\"\nimages = \"frames/right\"\n";
 
-/// Every file of an output folder whose bytes are promised.
-fn tree(root: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut files = BTreeMap::new();
-    let mut folders = vec![root.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).unwrap() {
-            let path = entry.unwrap().path();
-            let name = path.strip_prefix(root).unwrap().to_string_lossy().into_owned();
-            if path.is_dir() {
-                folders.push(path);
-            } else if name != "log.jsonl" && name != "timings.json" {
-                files.insert(name, std::fs::read(&path).unwrap());
-            }
-        }
-    }
-    files
-}
-
 #[test]
 fn init_writes_a_file_that_runs() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     let text = dive.ok(&["init", "frames"]);
     assert!(text.contains("frames_from = \"stem\"") && text.contains("name = \"left\"") && text.contains("64 x 48 pixels"), "{text}");
     dive.write("dive.toml", &text);
@@ -98,7 +24,7 @@ fn init_writes_a_file_that_runs() {
 
 #[test]
 fn init_of_nothing_is_told() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     std::fs::create_dir(dive.path("empty")).unwrap();
     assert_eq!(dive.fails(&["init", "empty"]).0, 3);
     assert_eq!(dive.fails(&["init", "missing"]).0, 1);
@@ -106,7 +32,7 @@ fn init_of_nothing_is_told() {
 
 #[test]
 fn a_wrong_file_or_command_line_exits_with_2() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     dive.write("dive.toml", &format!("{TWO}[mask]\nstratgy = \"ip\"\n"));
     let (code, message) = dive.fails(&["run"]);
     assert_eq!(code, 2);
@@ -119,7 +45,7 @@ fn a_wrong_file_or_command_line_exits_with_2() {
 
 #[test]
 fn status_says_what_changed() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     dive.write("dive.toml", TWO);
     let line = || dive.ok(&["status"]).lines().next().unwrap().to_owned();
     assert_eq!(line(), "ingest     missing  not run yet");
@@ -137,7 +63,7 @@ fn status_says_what_changed() {
 
 #[test]
 fn bad_images_are_warnings() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     std::fs::write(dive.path("frames/left/3.jpg"), "dear diary").unwrap();
     std::fs::write(dive.path("frames/left/4.png"), "").unwrap();
     std::fs::write(dive.path("frames/left/5.png"), png(32, 48, 5)).unwrap();
@@ -156,7 +82,7 @@ fn bad_images_are_warnings() {
 
 #[test]
 fn nothing_but_bad_images_exits_with_3() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     std::fs::create_dir(dive.path("frames/none")).unwrap();
     std::fs::write(dive.path("frames/none/1.jpg"), "dear diary").unwrap();
     dive.write("dive.toml", "[[camera]]\nimages = \"frames/none\"\n");
@@ -167,7 +93,7 @@ fn nothing_but_bad_images_exits_with_3() {
 
 #[test]
 fn a_folder_of_someone_else_is_left_alone() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     dive.write("dive.toml", TWO);
     std::fs::create_dir_all(dive.path("out/masks")).unwrap();
     dive.write("out/masks/mine.png", "mine");
@@ -179,7 +105,7 @@ fn a_folder_of_someone_else_is_left_alone() {
 
 #[test]
 fn the_same_dive_gives_the_same_bytes_anywhere() {
-    let (one, two) = (Dive::new(), Dive::new());
+    let (one, two) = (Dive::of_noise(), Dive::of_noise());
     one.write("dive.toml", TWO);
     two.write("dive.toml", &format!("{TWO}[dive]\noutput = \"elsewhere/results\"\n"));
     one.ok(&["run", "--threads", "1", "--until", "ingest"]);
@@ -192,7 +118,7 @@ fn the_same_dive_gives_the_same_bytes_anywhere() {
 /// A unit square in the plane z = 0, and points 1 and 3 mm above it: the mean is 2 mm.
 #[test]
 fn eval_measures_a_cloud() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     let header = |vertices: usize, rest: &str| {
         format!(
             "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n{rest}end_header\n"
@@ -213,7 +139,7 @@ fn eval_measures_a_cloud() {
 /// Masks from files: kept as 0 and 255, missing ones told, the image's size demanded.
 #[test]
 fn masks_come_from_files() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     std::fs::create_dir(dive.path("masks")).unwrap();
     let grey = |w: usize, h: usize, f: fn(usize) -> u8| {
         imaging::encode_png_grey(&scene::Raster::from_vec(w, h, (0..w * h).map(f).collect()).unwrap()).unwrap()
@@ -232,7 +158,7 @@ fn masks_come_from_files() {
 
 #[test]
 fn help_explains_every_key_of_the_report() {
-    let dive = Dive::new();
+    let dive = Dive::of_noise();
     dive.write("dive.toml", TWO);
     let report: serde_json::Value = serde_json::from_str(&dive.ok(&["run", "--until", "ingest", "--json"])).unwrap();
     let help = dive.ok(&["help", "json"]);

@@ -26,7 +26,8 @@ pub(super) fn status(args: &StatusArgs) -> Result<()> {
             State::Stale => "stale",
             State::Missing => "missing",
         };
-        let _ = writeln!(text, "{:<10} {:<8} {}", plan.name, state, plan.reasons.join("; "));
+        let line = format!("{:<10} {state:<8} {}", plan.name, plan.reasons.join("; "));
+        let _ = writeln!(text, "{}", line.trim_end());
     }
-    print(text.replace(" \n", "\n").as_str())
+    print(&text)
 }
