@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::stage::Stage;
-use crate::store::{Fingerprint, Identity, Stamp, is_unfinished, read_stamp};
+use crate::store::{Fingerprint, Hashes, Identity, Stamp, is_unfinished, read_stamp};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -36,14 +36,15 @@ pub struct Planned {
     pub stamp: Option<Stamp>,
 }
 
-/// Looks at every stage of a recipe. Reads every input once to hash it, and changes nothing.
+/// Looks at every stage of a recipe. Reads what is not remembered of the inputs to hash it, and changes nothing.
 #[must_use]
-pub fn plan(recipe: &[&Stage], config: &Config) -> Vec<Planned> {
+pub fn plan(recipe: &[&Stage], config: &Config, hashes: &Hashes) -> Vec<Planned> {
     let mut fingerprints: BTreeMap<&str, Fingerprint> = BTreeMap::new();
     let mut stages = Vec::with_capacity(recipe.len());
     for stage in recipe {
         let upstream = stage.upstream.iter().filter_map(|name| Some(((*name).to_owned(), *fingerprints.get(name)?))).collect();
-        let identity = Identity { version: stage.version, options: (stage.options)(config), inputs: (stage.inputs)(config), upstream };
+        let identity =
+            Identity { version: stage.version, options: (stage.options)(config), inputs: (stage.inputs)(config, hashes), upstream };
         let fingerprint = identity.fingerprint(stage.name);
         fingerprints.insert(stage.name, fingerprint);
         let stamp = read_stamp(&config.output, stage.name);

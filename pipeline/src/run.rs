@@ -5,7 +5,7 @@ use crate::config::Config;
 use crate::plan::{Planned, State, plan};
 use crate::progress::Progress;
 use crate::stage::{Stage, Work};
-use crate::store::{StageFiles, Stamp, Store};
+use crate::store::{Hashes, StageFiles, Stamp, Store};
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -45,7 +45,9 @@ pub fn run(recipe: &[&'static Stage], config: &Config, selection: &Selection, pr
     let from = place(&selection.from).unwrap_or(recipe.len());
     let force = place(&selection.force);
     let mut done = Done { stamps: BTreeMap::new(), timings: read_timings(&store) };
-    let planned = plan(recipe, config);
+    let hashes = Hashes::load(&config.output);
+    let planned = plan(recipe, config, &hashes);
+    hashes.save(&store)?;
     for (i, (stage, plan)) in recipe.iter().zip(&planned).enumerate().take(until + 1) {
         let anew = i >= from || force == Some(i);
         let stamp = match &plan.stamp {

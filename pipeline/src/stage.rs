@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::progress::Progress;
-use crate::store::{Fingerprint, StageFiles, Stamp, Store, StoreError, Warning};
+use crate::store::{Fingerprint, Hashes, StageFiles, Stamp, Store, StoreError, Warning};
 use anyhow::Result;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -18,14 +18,14 @@ pub struct Stage {
     /// The part of the configuration that its results depend on, without any path.
     pub options: fn(&Config) -> Value,
     /// Content of the files outside the store that it reads, by a name without path.
-    pub inputs: fn(&Config) -> BTreeMap<String, String>,
+    pub inputs: fn(&Config, &Hashes) -> BTreeMap<String, String>,
     /// Loads, calls the algorithm, saves.
     pub work: fn(&Work<'_>) -> Result<Outcome>,
 }
 
 /// For stages that read nothing from outside the store.
 #[must_use]
-pub fn no_inputs(_: &Config) -> BTreeMap<String, String> {
+pub fn no_inputs(_: &Config, _: &Hashes) -> BTreeMap<String, String> {
     BTreeMap::new()
 }
 

@@ -33,7 +33,9 @@ pub(super) fn help(args: &HelpArgs) -> Result<()> {
 fn json() -> String {
     let width = REPORT_KEYS.iter().map(|k| k.0.len()).max().unwrap_or(0);
     let mut text = String::from(
-        "Keys of report.json, which `sfm run --json` prints too. [] is a list, * a name, null a figure that is not known.\n\n",
+        "Keys of report.json, which `sfm run --json` prints too. [] is a list, * a name, null a figure that is not known.\n\
+         The same dive gives the same bytes in every file of the output folder but log.jsonl, timings.json and .hashes.json,\n\
+         which hold times and paths. So the times of the stages are in --json and timings.json, and not in report.json.\n\n",
     );
     for (key, meaning) in REPORT_KEYS {
         text.push_str(&format!("{key:<width$}  {meaning}\n"));

@@ -5,13 +5,14 @@ use super::dispatch::print;
 use crate::config;
 use crate::plan::{State, plan};
 use crate::recipe::RECIPE;
+use crate::store::Hashes;
 use anyhow::Result;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
 pub(super) fn status(args: &StatusArgs) -> Result<()> {
     let config = config::read(&args.dive)?;
-    let planned = plan(RECIPE, &config);
+    let planned = plan(RECIPE, &config, &Hashes::load(&config.output));
     if args.json {
         let stages: Vec<Value> = planned
             .iter()

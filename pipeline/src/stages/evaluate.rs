@@ -5,7 +5,7 @@ use super::{densify, mask, model};
 use crate::config::Config;
 use crate::reference::{read_positions, read_reference};
 use crate::stage::{Outcome, Stage, Work};
-use crate::store::{Fingerprint, Warning};
+use crate::store::{Fingerprint, Hashes, Warning};
 use anyhow::{Context, Result};
 use eval::trajectory::{Alignment, absolute_error};
 use eval::{EvalOptions, evaluate};
@@ -29,10 +29,9 @@ fn options(config: &Config) -> Value {
     })
 }
 
-fn inputs(config: &Config) -> BTreeMap<String, String> {
+fn inputs(config: &Config, hashes: &Hashes) -> BTreeMap<String, String> {
     let files = [("reference", &config.evaluate.reference), ("positions", &config.evaluate.positions)];
-    let hash = |path| Fingerprint::of_file(path).map_or_else(|e| format!("unreadable: {}", e.kind()), |f| f.to_string());
-    files.into_iter().filter_map(|(name, path)| Some((name.to_owned(), hash(path.as_ref()?)))).collect()
+    hashes.of_files(files.into_iter().filter_map(|(name, path)| Some((name.to_owned(), path.clone()?))).collect())
 }
 
 fn work(work: &Work<'_>) -> Result<Outcome> {

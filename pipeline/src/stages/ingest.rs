@@ -5,7 +5,7 @@ use super::pairing::{self, Exposure};
 use crate::config::{CameraConfig, Config, ImageSource};
 use crate::error::NoResult;
 use crate::stage::{Outcome, Stage, Work};
-use crate::store::{Fingerprint, Warning};
+use crate::store::{Fingerprint, Hashes, Warning};
 use anyhow::{Context, Result};
 use imaging::video::Video;
 use rayon::prelude::*;
@@ -34,17 +34,12 @@ fn options(config: &Config) -> Value {
     json!({"frames_from": config.frames_from, "camera": cameras})
 }
 
-fn inputs(config: &Config) -> BTreeMap<String, String> {
-    let files: Vec<(String, &Path)> = config
-        .cameras
-        .iter()
-        .flat_map(|camera| match &camera.images {
-            ImageSource::Files(files) => files.iter().enumerate().map(|(i, f)| (input_name(camera, i, f), f.as_path())).collect(),
-            ImageSource::Video { file, .. } => vec![(format!("{} video", camera.name), file.as_path())],
-        })
-        .collect();
-    let hash = |path: &Path| Fingerprint::of_file(path).map_or_else(|e| format!("unreadable: {}", e.kind()), |f| f.to_string());
-    files.into_par_iter().map(|(name, path)| (name, hash(path))).collect()
+fn inputs(config: &Config, hashes: &Hashes) -> BTreeMap<String, String> {
+    let files = config.cameras.iter().flat_map(|camera| match &camera.images {
+        ImageSource::Files(files) => files.iter().enumerate().map(|(i, f)| (input_name(camera, i, f), f.clone())).collect(),
+        ImageSource::Video { file, .. } => vec![(format!("{} video", camera.name), file.clone())],
+    });
+    hashes.of_files(files.collect())
 }
 
 /// Name of a file among the inputs: with its position, since order pairs images up and names may repeat.

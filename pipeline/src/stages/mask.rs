@@ -3,7 +3,7 @@
 use super::images::{ImageEntry, ImageList};
 use crate::config::{Config, IpConfig, MaskStrategy, Polarity};
 use crate::stage::{Outcome, Stage, Work};
-use crate::store::{Fingerprint, Warning};
+use crate::store::{Fingerprint, Hashes, Warning};
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 use scene::Mask;
@@ -22,7 +22,7 @@ fn options(config: &Config) -> Value {
 }
 
 /// Every file that the patterns could mean.
-fn inputs(config: &Config) -> BTreeMap<String, String> {
+fn inputs(config: &Config, hashes: &Hashes) -> BTreeMap<String, String> {
     if config.mask.strategy != MaskStrategy::Files {
         return BTreeMap::new();
     }
@@ -34,8 +34,7 @@ fn inputs(config: &Config) -> BTreeMap<String, String> {
         let found = glob::glob(&parts.join("*")).into_iter().flatten().flatten();
         files.extend(found.map(|f| (format!("{}/{}", camera.name, f.file_name().unwrap_or_default().to_string_lossy()), f)));
     }
-    let hash = |path: &PathBuf| Fingerprint::of_file(path).map_or_else(|e| format!("unreadable: {}", e.kind()), |f| f.to_string());
-    files.into_par_iter().map(|(name, path)| (name, hash(&path))).collect()
+    hashes.of_files(files)
 }
 
 /// Where the mask of an image lies.

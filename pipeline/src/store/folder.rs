@@ -15,6 +15,7 @@ const TEMPORARY: &str = ".tmp";
 const STAMPS: &str = "stamps";
 /// Everything that a run may write, directly below the folder.
 pub(super) const OURS: &[&str] = &[
+    super::hashes::FILE,
     TEMPORARY,
     STAMPS,
     "run.toml",

@@ -10,6 +10,7 @@ mod disk;
 mod error;
 mod fingerprint;
 mod folder;
+mod hashes;
 #[cfg(test)]
 mod laws;
 mod stage_files;
@@ -19,5 +20,6 @@ pub use disk::{Disk, RealDisk};
 pub use error::StoreError;
 pub use fingerprint::Fingerprint;
 pub use folder::{Store, is_unfinished, read_stamp};
+pub use hashes::Hashes;
 pub use stage_files::StageFiles;
 pub use stamp::{Identity, Output, Stamp, Warning};

@@ -98,7 +98,7 @@ pub fn tree(root: &Path) -> BTreeMap<String, Vec<u8>> {
             let name = path.strip_prefix(root).unwrap().to_string_lossy().into_owned();
             if path.is_dir() {
                 folders.push(path);
-            } else if name != "log.jsonl" && name != "timings.json" {
+            } else if !["log.jsonl", "timings.json", ".hashes.json"].contains(&name.as_str()) {
                 files.insert(name, std::fs::read(&path).unwrap());
             }
         }
