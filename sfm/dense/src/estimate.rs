@@ -3,7 +3,7 @@
 use crate::bytes::{storable_confidence, storable_normal};
 use crate::depth_map::remove_small_segments;
 use crate::patchmatch::{
-    Cell, GreyView, Kernel, Level, PatchWeights, Pinhole, SearchOptions, SourceView, Start, halve_u8, halve_u16, search,
+    Cell, GreyView, Kernel, Level, PatchWeights, Pinhole, SearchOptions, SourceView, Start, halve_grey, halve_valid, search,
 };
 use crate::seeds::seed_raster;
 use crate::view::{Rectified, rectify};
@@ -19,8 +19,8 @@ pub struct DepthOptions {
     pub fine_passes: u32,
     /// The image is halved until its long side is at most this, pixels.
     pub coarsest_side: u32,
-    /// A pixel's cost is the mean over this many neighbours that fit best, so that a surface may be hidden in the others. `None`: half of
-    /// them, rounded up.
+    /// A pixel's cost is the mean over this many neighbours that fit best, so that a surface may be hidden in the others. `None`: 1 of up
+    /// to 2, 2 of up to 5, 3 of more.
     pub best_views: Option<usize>,
     /// Depths of which the normalised correlation is below this are dropped.
     pub min_correlation: f32,
@@ -47,7 +47,7 @@ impl Default for DepthOptions {
             best_views: None,
             min_correlation: 0.5,
             noise: 0.7,
-            colour_sigma: 30.0,
+            colour_sigma: 20.0,
             spatial_sigma_px: 4.0,
             max_slant: 80f32.to_radians(),
             min_segment: 40,
@@ -111,13 +111,22 @@ pub fn estimate_depth_from_seeds(
         kernel: Kernel::detect(),
         seed: options.seed ^ (u64::from(reference.image.0) << 20),
         inverse_range: [(1.0 / far) as f32, (1.0 / near) as f32],
-        best: options.best_views.unwrap_or(sources.len().div_ceil(2)).min(sources.len()).max(1),
+        best: options.best_views.unwrap_or(best_of(sources.len())).min(sources.len()).max(1),
         min_squared_cosine: options.max_slant.cos().powi(2),
     };
     let weights = PatchWeights::new(options.colour_sigma, options.spatial_sigma_px, options.noise);
     let cells =
         if sources.is_empty() { None } else { run_levels(reference, &rectified, &sources, seeds, &weights, &search_options, options) };
     Ok(to_map(reference, rectified, neighbours, cells, options))
+}
+
+/// See [`DepthOptions::best_views`].
+fn best_of(sources: usize) -> usize {
+    match sources {
+        0..=2 => 1,
+        3..=5 => 2,
+        _ => 3,
+    }
 }
 
 /// One image of the pyramid: grey values and which pixels take part.
@@ -128,7 +137,7 @@ fn pyramid(rectified: &Rectified, levels: usize) -> Vec<Layer> {
     let mut out = vec![(rectified.grey.clone(), rectified.valid.clone())];
     for level in 1..levels {
         let (grey, valid) = &out[level - 1];
-        out.push((halve_u16(grey), halve_u8(valid)));
+        out.push((halve_grey(grey), halve_valid(valid)));
     }
     out
 }

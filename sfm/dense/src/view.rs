@@ -39,6 +39,11 @@ impl View {
     }
 }
 
+/// The pixel takes part.
+pub(crate) const ACTIVE: u8 = 1;
+/// The pixel shows something, masked or not.
+pub(crate) const INSIDE: u8 = 2;
+
 /// A view without distortion.
 #[derive(Clone, Debug)]
 pub(crate) struct Rectified {
@@ -47,7 +52,7 @@ pub(crate) struct Rectified {
     pub rgb: Raster<[u8; 3]>,
     /// 65,280 times the luma in 0..=1.
     pub grey: Raster<u16>,
-    /// 1 where the pixel is inside the image and not masked.
+    /// [`INSIDE`] where the pixel is in the image, and [`ACTIVE`] where it is not masked either.
     pub valid: Raster<u8>,
 }
 
@@ -56,10 +61,10 @@ pub(crate) struct Rectified {
 pub(crate) fn rectify(view: &View) -> Result<Rectified, DenseError> {
     view.validate()?;
     if view.camera.model() == CameraModel::Pinhole {
-        let valid = view
-            .mask
-            .as_ref()
-            .map_or_else(|| Raster::filled(view.rgb.width(), view.rgb.height(), 1), |mask| mask.map(|&m| u8::from(m >= 128)));
+        let valid = view.mask.as_ref().map_or_else(
+            || Raster::filled(view.rgb.width(), view.rgb.height(), INSIDE | ACTIVE),
+            |mask| mask.map(|&m| if m >= 128 { INSIDE | ACTIVE } else { INSIDE }),
+        );
         return Ok(Rectified { camera: view.camera, grey: view.rgb.map(|&c| luma(c)), rgb: view.rgb.clone(), valid });
     }
     let camera = pinhole_for(&view.camera).map_err(|source| DenseError::Rectification { image: view.image, source })?;
@@ -74,7 +79,7 @@ pub(crate) fn rectify(view: &View) -> Result<Rectified, DenseError> {
             out.rgb[(x, y)] = colour;
             out.grey[(x, y)] = grey;
             let masked = view.mask.as_ref().is_some_and(|m| m.at_point(pixel.x, pixel.y).is_none_or(|&v| v < 128));
-            out.valid[(x, y)] = u8::from(!masked);
+            out.valid[(x, y)] = if masked { INSIDE } else { INSIDE | ACTIVE };
         }
     }
     Ok(out)
@@ -162,7 +167,7 @@ mod tests {
             let mut inside = 0;
             for y in 0..h {
                 for x in 0..w {
-                    if rectified.valid[(x, y)] == 0 {
+                    if rectified.valid[(x, y)] & ACTIVE == 0 {
                         continue;
                     }
                     inside += 1;
@@ -190,9 +195,9 @@ mod tests {
         let rectified = rectify(&v).expect("possible");
         let centre = rectified.camera.principal_point()[0] as usize;
         for y in 0..rectified.valid.height() {
-            assert!(rectified.valid.row(y)[..centre - 1].iter().all(|&m| m == 0));
+            assert!(rectified.valid.row(y)[..centre - 1].iter().all(|&m| m & ACTIVE == 0));
         }
-        assert!(rectified.valid.row(rectified.valid.height() / 2)[centre + 1..].iter().all(|&m| m == 1));
+        assert!(rectified.valid.row(rectified.valid.height() / 2)[centre + 1..].iter().all(|&m| m == INSIDE | ACTIVE));
         v.mask = Some(Raster::filled(64, 47, 255));
         assert!(matches!(rectify(&v), Err(DenseError::SizeMismatch { what: "mask", .. })));
     }

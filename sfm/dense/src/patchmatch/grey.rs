@@ -1,5 +1,6 @@
 //! Grey images laid out for sampling between pixels, and their reduction.
 
+use crate::view::{ACTIVE, INSIDE};
 use scene::Raster;
 
 /// A grey image whose every element holds a pixel and its right neighbour, so that a bilinear sample takes two loads.
@@ -8,7 +9,7 @@ pub(crate) struct GreyView {
     pub height: usize,
     /// Low half: the pixel; high half: the pixel to its right (its own value in the last column).
     pub pairs: Vec<u32>,
-    /// 1 where the pixel takes part.
+    /// [`crate::view::ACTIVE`] and [`crate::view::INSIDE`] of every pixel.
     pub valid: Raster<u8>,
 }
 
@@ -28,13 +29,13 @@ impl GreyView {
 }
 
 /// Half the size by averaging 2 x 2 pixels; the last row or column of an odd size is left out, so that coordinates halve exactly.
-pub(crate) fn halve_u16(image: &Raster<u16>) -> Raster<u16> {
+pub(crate) fn halve_grey(image: &Raster<u16>) -> Raster<u16> {
     halve(image, |a, b, c, d| ((u32::from(a) + u32::from(b) + u32::from(c) + u32::from(d) + 2) / 4) as u16)
 }
 
-/// Half the size; a pixel takes part where any of its four does.
-pub(crate) fn halve_u8(image: &Raster<u8>) -> Raster<u8> {
-    halve(image, |a, b, c, d| a | b | c | d)
+/// Half the size; a pixel takes part where any of its four does, and is inside where all are.
+pub(crate) fn halve_valid(image: &Raster<u8>) -> Raster<u8> {
+    halve(image, |a, b, c, d| (a | b | c | d) & ACTIVE | a & b & c & d & INSIDE)
 }
 
 fn halve<T: Copy>(image: &Raster<T>, combine: impl Fn(T, T, T, T) -> T) -> Raster<T> {

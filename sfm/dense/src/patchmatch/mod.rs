@@ -15,7 +15,7 @@ mod score;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use grey::{GreyView, halve_u8, halve_u16};
+pub(crate) use grey::{GreyView, halve_grey, halve_valid};
 pub(crate) use grid::Cell;
 pub(crate) use level::{Level, Start, search};
 pub(crate) use patch::PatchWeights;

@@ -1,5 +1,6 @@
 //! The window of the reference image, prepared once for all planes that are tried at a pixel.
 
+use crate::view::ACTIVE;
 use scene::Raster;
 
 /// Samples of a window, padded to whole groups of 8 lanes: 6 x 6 with a distance of 2 pixels, and the centre.
@@ -62,7 +63,7 @@ impl Patch {
     /// `None` where the pixel is invalid or the window shows less contrast than the noise.
     #[inline]
     pub fn new(grey: &Raster<u16>, valid: &Raster<u8>, x: usize, y: usize, weights: &PatchWeights) -> Option<Self> {
-        if valid[(x, y)] == 0 {
+        if valid[(x, y)] & ACTIVE == 0 {
             return None;
         }
         let (w, h) = (grey.width() as i32, grey.height() as i32);
@@ -74,7 +75,7 @@ impl Patch {
             }
             let at = (sx as usize, sy as usize);
             let v = grey[at];
-            weight[k] = weights.spatial[k] * weights.colour[usize::from(v.abs_diff(centre) >> 8)] * f32::from(valid[at]);
+            weight[k] = weights.spatial[k] * weights.colour[usize::from(v.abs_diff(centre) >> 8)] * f32::from(valid[at] & ACTIVE);
             value[k] = f32::from(v);
         };
         for j in 0..6 {

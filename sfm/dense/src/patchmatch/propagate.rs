@@ -5,7 +5,7 @@ use super::level::Level;
 use super::patch::Patch;
 use super::plane::Plane;
 use super::random::Draw;
-use super::score::{Kernel, NO_MATCH};
+use super::score::{Kernel, NO_MATCH, Question, Scratch};
 use rayon::prelude::*;
 
 /// What a search needs beside the images.
@@ -45,6 +45,7 @@ pub(crate) fn update(grid: &mut Grid, colour: usize, level: &Level, options: &Se
     let [first, second] = &mut grid.colours;
     let (mine, other) = if colour == 0 { (first, &*second) } else { (second, &*first) };
     mine.par_chunks_mut(half).enumerate().for_each(|(y, row)| {
+        let mut scratch = Scratch::new();
         for (i, cell) in row.iter_mut().enumerate() {
             let x = 2 * i + ((y & 1) ^ colour);
             if x >= width {
@@ -55,7 +56,7 @@ pub(crate) fn update(grid: &mut Grid, colour: usize, level: &Level, options: &Se
                 let (nx, ny) = (x as i32 + dx, y as i32 + dy);
                 (nx >= 0 && ny >= 0 && nx < width as i32 && ny < height as i32).then(|| other[ny as usize * half + nx as usize / 2])
             };
-            let mut pixel = Pixel::new(level, options, &patch, x, y, *cell);
+            let mut pixel = Pixel::new(level, options, &patch, [x as f32, y as f32], *cell, &mut scratch);
             pixel.take_from_neighbours(neighbour);
             pixel.change(&mut Draw::new(options.seed, pass.number, x, y), pass);
             *cell = pixel.cell;
@@ -68,13 +69,14 @@ pub(crate) fn score_all(grid: &mut Grid, level: &Level, options: &SearchOptions)
     let (width, half) = (grid.width, grid.half);
     for (colour, cells) in grid.colours.iter_mut().enumerate() {
         cells.par_chunks_mut(half).enumerate().for_each(|(y, row)| {
+            let mut scratch = Scratch::new();
             for (i, cell) in row.iter_mut().enumerate() {
                 let x = 2 * i + ((y & 1) ^ colour);
                 cell.cost = NO_MATCH;
                 if x < width
                     && let Some(patch) = Patch::new(&level.grey, &level.valid, x, y, level.weights)
                 {
-                    let pixel = Pixel::new(level, options, &patch, x, y, *cell);
+                    let mut pixel = Pixel::new(level, options, &patch, [x as f32, y as f32], *cell, &mut scratch);
                     cell.cost = pixel.score(cell.plane);
                 }
             }
@@ -85,31 +87,27 @@ pub(crate) fn score_all(grid: &mut Grid, level: &Level, options: &SearchOptions)
 struct Pixel<'a> {
     level: &'a Level<'a>,
     options: &'a SearchOptions,
-    patch: &'a Patch,
-    x: f32,
-    y: f32,
+    question: Question<'a>,
+    scratch: &'a mut Scratch,
     cell: Cell,
     /// Change of inverse depth that moves the projection by a pixel in the most sensitive neighbour.
     inverse_per_px: f32,
 }
 
 impl<'a> Pixel<'a> {
-    fn new(level: &'a Level, options: &'a SearchOptions, patch: &'a Patch, x: usize, y: usize, cell: Cell) -> Self {
-        let (x, y) = (x as f32, y as f32);
-        let most = level.sources.iter().map(|s| s.sensitivity(x, y, cell.plane.w)).fold(0.0, f32::max);
-        let inverse_per_px = 1.0 / most.max(1e-20);
-        Self { level, options, patch, x, y, cell, inverse_per_px }
+    fn new(level: &'a Level, options: &'a SearchOptions, patch: &'a Patch, at: [f32; 2], cell: Cell, scratch: &'a mut Scratch) -> Self {
+        let most = level.sources.iter().map(|s| s.sensitivity(at[0], at[1], cell.plane.w)).fold(0.0, f32::max);
+        let question = Question { sources: &level.sources, patch, at, noise: level.weights.noise_variance, best: options.best };
+        Self { level, options, question, scratch, cell, inverse_per_px: 1.0 / most.max(1e-20) }
     }
 
-    fn score(&self, plane: Plane) -> f32 {
+    fn score(&mut self, plane: Plane) -> f32 {
         let [low, high] = self.options.inverse_range;
-        if !(plane.w >= low && plane.w <= high)
-            || plane.squared_cosine(&self.level.pinhole, self.x, self.y) < self.options.min_squared_cosine
-        {
+        let [x, y] = self.question.at;
+        if !(plane.w >= low && plane.w <= high) || plane.squared_cosine(&self.level.pinhole, x, y) < self.options.min_squared_cosine {
             return NO_MATCH;
         }
-        let noise = self.level.weights.noise_variance;
-        self.options.kernel.score(&self.level.sources, self.patch, [self.x, self.y], plane, noise, self.options.best)
+        self.options.kernel.score(&self.question, plane, self.scratch)
     }
 
     fn consider(&mut self, plane: Plane) {

@@ -3,6 +3,7 @@
 use super::grey::GreyView;
 use super::patch::{DX, DY, Patch, RADIUS, SAMPLES, reduce};
 use super::plane::{Pinhole, Plane};
+use crate::view::{ACTIVE, INSIDE};
 use nalgebra::{Matrix3, Vector3};
 use scene::Rigid3;
 
@@ -64,6 +65,19 @@ impl SourceView {
     }
 }
 
+/// What is asked about every plane that is tried at a pixel.
+#[derive(Clone, Copy)]
+pub(crate) struct Question<'a> {
+    pub sources: &'a [SourceView],
+    pub patch: &'a Patch,
+    /// The pixel.
+    pub at: [f32; 2],
+    /// Variance of the noise.
+    pub noise: f32,
+    /// How many neighbours count, 1..=[`MAX_SOURCES`].
+    pub best: usize,
+}
+
 /// Which compiled form of the score runs. All forms give the same bits: no fused multiply-add, fixed order of sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kernel {
@@ -82,30 +96,30 @@ impl Kernel {
         Self::Portable
     }
 
-    /// Mean over the `best` lowest costs, one minus normalised correlation each, of the neighbours: 0 perfect.
+    /// Mean of the lowest costs, one minus normalised correlation each, of the neighbours: 0 perfect.
     #[inline]
-    pub fn score(self, sources: &[SourceView], patch: &Patch, at: [f32; 2], plane: Plane, noise: f32, best: usize) -> f32 {
+    pub fn score(self, question: &Question, plane: Plane, scratch: &mut Scratch) -> f32 {
         match self {
-            Self::Portable => score(sources, patch, at, plane, noise, best),
+            Self::Portable => score(question, plane, scratch),
             // SAFETY: this variant is only made by `detect`, after it found AVX2.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { score_avx2(sources, patch, at, plane, noise, best) },
+            Self::Avx2 => unsafe { score_avx2(question, plane, scratch) },
         }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn score_avx2(sources: &[SourceView], patch: &Patch, at: [f32; 2], plane: Plane, noise: f32, best: usize) -> f32 {
-    score(sources, patch, at, plane, noise, best)
+fn score_avx2(question: &Question, plane: Plane, scratch: &mut Scratch) -> f32 {
+    score(question, plane, scratch)
 }
 
 #[inline(always)]
-fn score(sources: &[SourceView], patch: &Patch, at: [f32; 2], plane: Plane, noise: f32, best: usize) -> f32 {
+fn score(question: &Question, plane: Plane, scratch: &mut Scratch) -> f32 {
     let mut costs = [UNSEEN; MAX_SOURCES];
     let mut seen = 0;
-    for source in sources.iter().take(MAX_SOURCES) {
-        let Some(cost) = correlate(source, patch, at, plane, noise) else { continue };
+    for source in question.sources.iter().take(MAX_SOURCES) {
+        let Some(cost) = correlate(source, question, plane, scratch) else { continue };
         // Insertion keeps the list sorted: it is short.
         let mut i = seen;
         while i > 0 && costs[i - 1] > cost {
@@ -118,62 +132,149 @@ fn score(sources: &[SourceView], patch: &Patch, at: [f32; 2], plane: Plane, nois
     if seen == 0 {
         return NO_MATCH;
     }
+    let best = question.best.min(MAX_SOURCES);
     costs[..best].iter().sum::<f32>() / best as f32
 }
 
 /// One minus the normalised correlation between the window and its image in one neighbour; `None` where that does not see it.
 #[inline(always)]
-fn correlate(source: &SourceView, patch: &Patch, [x, y]: [f32; 2], plane: Plane, noise: f32) -> Option<f32> {
+fn correlate(source: &SourceView, question: &Question, plane: Plane, scratch: &mut Scratch) -> Option<f32> {
+    let Question { patch, at: [x, y], noise, .. } = *question;
     let grey = &source.grey;
-    let centre = source.homogeneous(x, y, plane.w);
-    let along_x = [0, 1, 2].map(|i| source.a[i][0] + source.b[i] * plane.gx);
-    let along_y = [0, 1, 2].map(|i| source.a[i][1] + source.b[i] * plane.gy);
+    let window = Window::new(source, x, y, plane);
     // The image of the window is convex: its corners decide. The margin is far above rounding.
     let (right, bottom) = (grey.width as f32 - 1.01, grey.height as f32 - 1.01);
     const R: f32 = RADIUS as f32;
     for (dx, dy) in [(-R, -R), (R, -R), (-R, R), (R, R)] {
-        let [hx, hy, hz] = [0, 1, 2].map(|i| centre[i] + along_x[i] * dx + along_y[i] * dy);
-        if !(hz > 1e-6 && hx >= 0.01 * hz && hy >= 0.01 * hz && hx <= right * hz && hy <= bottom * hz) {
+        let [hx, hy, hz] = window.homogeneous(dx, dy);
+        let inside = hz > 1e-6 && hx >= 0.01 * hz && hy >= 0.01 * hz && hx <= right * hz && hy <= bottom * hz;
+        if !inside || window.flags(grey, dx, dy) & INSIDE == 0 {
             return None;
         }
     }
-    let inverse = 1.0 / centre[2];
-    if grey.valid.get((centre[0] * inverse + 0.5) as usize, (centre[1] * inverse + 0.5) as usize) != Some(&1) {
+    if window.flags(grey, 0.0, 0.0) & ACTIVE == 0 {
         return None;
     }
-    let (width, limit) = (grey.width as u32, ((grey.height - 1) * grey.width - 1) as u32);
-    let (mut top, mut bottom) = ([0u32; SAMPLES], [0u32; SAMPLES]);
-    let (mut fx, mut fy, mut index) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES], [0u32; SAMPLES]);
+    window.sample(grey, scratch);
+    // Sums over every eighth sample first: the compiler makes vectors of stores to consecutive places.
+    let Scratch { values, weighted, lanes, .. } = scratch;
     for k in 0..SAMPLES {
-        let [hx, hy, hz] = [0, 1, 2].map(|i| centre[i] + along_x[i] * DX[k] + along_y[i] * DY[k]);
+        values[k] -= patch.mean;
+        weighted[k] = patch.weight[k] * values[k];
+    }
+    let (v, w, r) = (&*values, &*weighted, &patch.weighted_value);
+    for l in 0..8 {
+        lanes[0][l] = w[l] + w[l + 8] + w[l + 16] + w[l + 24] + w[l + 32];
+    }
+    for l in 0..8 {
+        let p = |k: usize| w[k] * v[k];
+        lanes[1][l] = p(l) + p(l + 8) + p(l + 16) + p(l + 24) + p(l + 32);
+    }
+    for l in 0..8 {
+        let p = |k: usize| r[k] * v[k];
+        lanes[2][l] = p(l) + p(l + 8) + p(l + 16) + p(l + 24) + p(l + 32);
+    }
+    let [mean, squares, products] = lanes.map(reduce);
+    let variance = (squares - mean * mean).max(0.0);
+    Some(1.0 - products / ((patch.variance + noise) * (variance + noise)).sqrt())
+}
+
+/// The homography of a plane around one pixel: homogeneous coordinates at the pixel and their changes a pixel along x and y.
+struct Window {
+    centre: [f32; 3],
+    along_x: [f32; 3],
+    along_y: [f32; 3],
+}
+
+impl Window {
+    #[inline(always)]
+    fn new(source: &SourceView, x: f32, y: f32, plane: Plane) -> Self {
+        let mut window = Self { centre: source.homogeneous(x, y, plane.w), along_x: [0.0; 3], along_y: [0.0; 3] };
+        for i in 0..3 {
+            window.along_x[i] = source.a[i][0] + source.b[i] * plane.gx;
+            window.along_y[i] = source.a[i][1] + source.b[i] * plane.gy;
+        }
+        window
+    }
+
+    #[inline(always)]
+    fn homogeneous(&self, dx: f32, dy: f32) -> [f32; 3] {
+        let mut out = self.centre;
+        for i in 0..3 {
+            out[i] += self.along_x[i] * dx + self.along_y[i] * dy;
+        }
+        out
+    }
+
+    /// What is known about the pixel that the offset falls on, 0 outside.
+    #[inline(always)]
+    fn flags(&self, grey: &GreyView, dx: f32, dy: f32) -> u8 {
+        let [hx, hy, hz] = self.homogeneous(dx, dy);
         let inverse = 1.0 / hz;
-        let (u, v) = (hx * inverse, hy * inverse);
-        let (ru, rv) = (u - 0.5 + ROUND, v - 0.5 + ROUND);
-        fx[k] = u - (ru - ROUND);
-        fy[k] = v - (rv - ROUND);
-        let (iu, iv) = (ru.to_bits() & 0x7f_ffff, rv.to_bits() & 0x7f_ffff);
-        index[k] = iv.wrapping_mul(width).wrapping_add(iu).min(limit);
+        grey.valid.get((hx * inverse + 0.5) as usize, (hy * inverse + 0.5) as usize).copied().unwrap_or(0)
     }
-    let (upper, lower) = (&grey.pairs[..], &grey.pairs[grey.width..]);
-    for k in 0..SAMPLES {
-        top[k] = upper[index[k] as usize];
-        bottom[k] = lower[index[k] as usize];
-    }
-    let (mut sum, mut squares, mut products) = ([0.0f32; 8], [0.0f32; 8], [0.0f32; 8]);
-    for c in 0..SAMPLES / 8 {
-        for l in 0..8 {
-            let k = 8 * c + l;
-            let left_right = |pair: u32| ((pair & 0xffff) as i32 as f32, (pair >> 16) as i32 as f32);
-            let ((tl, tr), (bl, br)) = (left_right(top[k]), left_right(bottom[k]));
+
+    /// Intensities at the window's samples, which all lie inside. Plain loops over fixed lengths: the compiler makes vectors of them, but
+    /// for the loads.
+    #[inline(always)]
+    fn sample(&self, grey: &GreyView, scratch: &mut Scratch) {
+        let Scratch { fx, fy, index, top, bottom, values, .. } = scratch;
+        let ([cx, cy, cz], [ax, ay, az], [bx, by, bz]) = (self.centre, self.along_x, self.along_y);
+        let (width, limit) = (grey.width as u32, ((grey.height - 1) * grey.width - 1) as u32);
+        for k in 0..SAMPLES {
+            let (dx, dy) = (DX[k], DY[k]);
+            let inverse = 1.0 / (cz + (az * dx + bz * dy));
+            let u = (cx + (ax * dx + bx * dy)) * inverse;
+            let v = (cy + (ay * dx + by * dy)) * inverse;
+            let (ru, rv) = (u - 0.5 + ROUND, v - 0.5 + ROUND);
+            fx[k] = u - (ru - ROUND);
+            fy[k] = v - (rv - ROUND);
+            let (iu, iv) = (ru.to_bits() & 0x7f_ffff, rv.to_bits() & 0x7f_ffff);
+            index[k] = iv.wrapping_mul(width).wrapping_add(iu).min(limit);
+        }
+        let (upper, lower) = (&grey.pairs[..], &grey.pairs[grey.width..]);
+        assert!((limit as usize) < lower.len());
+        for k in 0..SAMPLES {
+            // SAFETY: every index is at most `limit`, which the assertion compares with the shorter of both slices.
+            unsafe {
+                top[k] = *upper.get_unchecked(index[k] as usize);
+                bottom[k] = *lower.get_unchecked(index[k] as usize);
+            }
+        }
+        for k in 0..SAMPLES {
+            let (tl, tr) = ((top[k] & 0xffff) as i32 as f32, (top[k] >> 16) as i32 as f32);
+            let (bl, br) = ((bottom[k] & 0xffff) as i32 as f32, (bottom[k] >> 16) as i32 as f32);
             let (t, b) = (tl + fx[k] * (tr - tl), bl + fx[k] * (br - bl));
-            let s = t + fy[k] * (b - t) - patch.mean;
-            let ws = patch.weight[k] * s;
-            sum[l] += ws;
-            squares[l] += ws * s;
-            products[l] += patch.weighted_value[k] * s;
+            values[k] = t + fy[k] * (b - t);
         }
     }
-    let mean = reduce(sum);
-    let variance = (reduce(squares) - mean * mean).max(0.0);
-    Some(1.0 - reduce(products) / ((patch.variance + noise) * (variance + noise)).sqrt())
+}
+
+/// Room for intermediate values, so that they need not be cleared each time; what it held before does not matter.
+#[derive(Clone)]
+pub(crate) struct Scratch {
+    fx: [f32; SAMPLES],
+    fy: [f32; SAMPLES],
+    index: [u32; SAMPLES],
+    top: [u32; SAMPLES],
+    bottom: [u32; SAMPLES],
+    values: [f32; SAMPLES],
+    weighted: [f32; SAMPLES],
+    lanes: [[f32; 8]; 3],
+}
+
+impl Scratch {
+    pub fn new() -> Self {
+        let (floats, integers) = ([0.0; SAMPLES], [0; SAMPLES]);
+        Self {
+            fx: floats,
+            fy: floats,
+            index: integers,
+            top: integers,
+            bottom: integers,
+            values: floats,
+            weighted: floats,
+            lanes: [[0.0; 8]; 3],
+        }
+    }
 }

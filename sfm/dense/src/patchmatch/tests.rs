@@ -1,6 +1,6 @@
 use super::patch::Patch;
 use super::plane::Plane;
-use super::score::NO_MATCH;
+use super::score::{NO_MATCH, Question, Scratch};
 use super::*;
 use scene::{Raster, Rigid3};
 
@@ -15,7 +15,7 @@ fn textured(w: usize, h: usize) -> Raster<u16> {
 const K: Pinhole = Pinhole { fx: 100.0, fy: 110.0, cx: 31.0, cy: 24.0 };
 
 fn source(grey: &Raster<u16>, pose: &Rigid3) -> SourceView {
-    SourceView::new(GreyView::new(grey, &Raster::filled(grey.width(), grey.height(), 1)), &K, &K, pose)
+    SourceView::new(GreyView::new(grey, &Raster::filled(grey.width(), grey.height(), 3)), &K, &K, pose)
 }
 
 #[test]
@@ -44,11 +44,12 @@ fn the_plane_of_a_point_projects_it() {
 fn a_view_matches_itself_and_only_at_the_right_place() {
     let grey = textured(64, 48);
     let weights = PatchWeights::new(30.0, 4.0, 0.01);
-    let patch = Patch::new(&grey, &Raster::filled(64, 48, 1), 30, 24, &weights).expect("contrast");
+    let patch = Patch::new(&grey, &Raster::filled(64, 48, 3), 30, 24, &weights).expect("contrast");
     // A sideways step of 0.5 at inverse depth 0.1 is 5 pixels: the source shows the same texture 5 pixels further.
     let shifted = Raster::from_vec(64, 48, (0..64 * 48).map(|i| textured(80, 48)[(i % 64 + 5, i / 64)]).collect()).expect("size");
     let sources = [source(&shifted, &Rigid3::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::new(-0.5, 0.0, 0.0)))];
-    let cost = |w| Kernel::Portable.score(&sources, &patch, [30.0, 24.0], Plane { w, gx: 0.0, gy: 0.0 }, weights.noise_variance, 1);
+    let question = Question { sources: &sources, patch: &patch, at: [30.0, 24.0], noise: weights.noise_variance, best: 1 };
+    let cost = |w| Kernel::Portable.score(&question, Plane { w, gx: 0.0, gy: 0.0 }, &mut Scratch::new());
     assert!(cost(0.1) < 1e-3, "{}", cost(0.1));
     assert!(cost(0.13) > 0.05 && cost(0.07) > 0.05, "{} {}", cost(0.13), cost(0.07));
     // Far outside.
@@ -64,9 +65,10 @@ fn all_kernels_give_the_same_bits() {
     let mut compared = 0;
     for y in 0..48 {
         for x in 0..64 {
-            let Some(patch) = Patch::new(&grey, &Raster::filled(64, 48, 1), x, y, &weights) else { continue };
+            let Some(patch) = Patch::new(&grey, &Raster::filled(64, 48, 3), x, y, &weights) else { continue };
             let plane = Plane { w: 0.1 + 0.003 * x as f32, gx: 0.001, gy: 0.0005 * (y as f32 - 20.0) / 20.0 };
-            let cost = |kernel: Kernel| kernel.score(&sources, &patch, [x as f32, y as f32], plane, weights.noise_variance, 2).to_bits();
+            let question = Question { sources: &sources, patch: &patch, at: [x as f32, y as f32], noise: weights.noise_variance, best: 2 };
+            let cost = |kernel: Kernel| kernel.score(&question, plane, &mut Scratch::new()).to_bits();
             assert_eq!(cost(Kernel::Portable), cost(Kernel::detect()));
             compared += usize::from(f32::from_bits(cost(Kernel::Portable)) < NO_MATCH);
         }
