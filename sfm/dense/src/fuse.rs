@@ -39,8 +39,8 @@ impl Default for FusionOptions {
         Self {
             min_views: 3,
             max_reprojection_px: 1.0,
-            max_relative_depth: 0.01,
-            max_normal_angle: 45f64.to_radians(),
+            max_relative_depth: 0.02,
+            max_normal_angle: 60f64.to_radians(),
             min_confidence: 0.0,
             match_sigma_px: 0.3,
             min_company: 8,

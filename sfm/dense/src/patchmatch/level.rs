@@ -29,7 +29,9 @@ pub(crate) enum Start<'a> {
 const FIRST_CHANGE_PX: f32 = 4.0;
 /// The same where the search continues from a coarser level, whose error is a fraction of a pixel.
 const NEXT_CHANGE_PX: f32 = 0.8;
-/// Continued searches try random planes only where nothing fits.
+/// The first search tries random planes wherever the fit is not almost perfect.
+const FIRST_RESTART_ABOVE: f32 = 0.05;
+/// Continued searches try them only where nothing fits.
 const RESTART_ABOVE: f32 = 0.6;
 
 /// Runs `passes` updates of both colours; `first_pass` numbers the random streams.
@@ -46,12 +48,12 @@ pub(crate) fn search(level: &Level, start: &Start, options: &SearchOptions, pass
         }
     }
     score_all(&mut grid, level, options);
-    let (mut change_px, restart_above) = match start {
-        Start::Seeds(_) => (FIRST_CHANGE_PX, 0.05),
-        Start::Coarser(_) => (NEXT_CHANGE_PX, RESTART_ABOVE),
+    let (mut change_px, restart_above, far) = match start {
+        Start::Seeds(_) => (FIRST_CHANGE_PX, FIRST_RESTART_ABOVE, true),
+        Start::Coarser(_) => (NEXT_CHANGE_PX, RESTART_ABOVE, false),
     };
     for pass in 0..passes {
-        let pass = Pass { number: first_pass + 1 + pass, change_px, restart_above };
+        let pass = Pass { number: first_pass + 1 + pass, change_px, restart_above, far };
         update(&mut grid, 0, level, options, &pass);
         update(&mut grid, 1, level, options, &pass);
         change_px *= 0.5;

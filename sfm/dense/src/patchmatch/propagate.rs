@@ -30,10 +30,12 @@ pub(crate) struct Pass {
     pub change_px: f32,
     /// Random planes of the whole range for pixels whose cost is above this.
     pub restart_above: f32,
+    /// Whether planes are also taken from far away, which pays only until the first ones have spread.
+    pub far: bool,
 }
 
 /// Planes closer than this in the most sensitive neighbour are one, pixels at the window's rim.
-const SAME_PX: f32 = 0.05;
+const SAME_PX: f32 = 0.1;
 
 /// Positions of the other colour whose best plane is tried, for the direction "up"; the others are rotations.
 const NEAR: [(i32, i32); 4] = [(0, -1), (0, -3), (-1, -2), (1, -2)];
@@ -57,7 +59,7 @@ pub(crate) fn update(grid: &mut Grid, colour: usize, level: &Level, options: &Se
                 (nx >= 0 && ny >= 0 && nx < width as i32 && ny < height as i32).then(|| other[ny as usize * half + nx as usize / 2])
             };
             let mut pixel = Pixel::new(level, options, &patch, [x as f32, y as f32], *cell, &mut scratch);
-            pixel.take_from_neighbours(neighbour);
+            pixel.take_from_neighbours(pass.far, neighbour);
             pixel.change(&mut Draw::new(options.seed, pass.number, x, y), pass);
             *cell = pixel.cell;
         }
@@ -117,12 +119,13 @@ impl<'a> Pixel<'a> {
         }
     }
 
-    /// The best plane of each of eight regions, four near and four far.
-    fn take_from_neighbours(&mut self, neighbour: impl Fn(i32, i32) -> Option<Cell>) {
-        for offsets in [&NEAR[..], &FAR[..]] {
+    /// The best plane of each of four near regions, and of four far ones.
+    fn take_from_neighbours(&mut self, far: bool, neighbour: impl Fn(i32, i32) -> Option<Cell>) {
+        let regions: &[&[(i32, i32)]] = if far { &[&NEAR, &FAR] } else { &[&NEAR] };
+        for offsets in regions {
             for turn in 0..4 {
                 let mut found: Option<(Cell, i32, i32)> = None;
-                for &(dx, dy) in offsets {
+                for &(dx, dy) in *offsets {
                     let (dx, dy) = [(dx, dy), (dy, dx), (dx, -dy), (-dy, dx)][turn];
                     if let Some(cell) = neighbour(dx, dy)
                         && found.is_none_or(|(best, ..)| cell.cost < best.cost)
