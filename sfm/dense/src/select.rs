@@ -30,17 +30,21 @@ impl Default for ViewSelectionOptions {
 /// The score of an image is the sum over shared points of a weight for the triangulation angle, which falls to 0 below
 /// `good_angle` and like a Gaussian above `wide_angle`, and one for the ratio of ground sample distances, 1 for equal
 /// ones (after Schoenberger et al., *Pixelwise view selection for unstructured multi-view stereo*, ECCV 2016, whose priors
-/// these are for whole images). Images of the same exposure of a rig count as any other. Equal scores are ordered by id. Empty
-/// when `image` is not oriented or out of range.
+/// these are for whole images). The best image is taken first; then always the one with the best score when each point counts less the
+/// better the images taken before show it, so that all parts of the image get neighbours. Images of the same exposure of a rig count as any
+/// other. Of equal scores the lower id wins. Empty when `image` is not oriented or out of range.
 #[must_use]
 pub fn select_views(reconstruction: &Reconstruction, image: ImageId, options: &ViewSelectionOptions) -> Vec<ImageId> {
     let Some(pose) = pose_of(reconstruction, image) else { return Vec::new() };
     let centre = pose.centre();
     let poses: Vec<_> = (0..reconstruction.images.len()).map(|i| reconstruction.cam_from_world(ImageId::new(i))).collect();
     let focal = |i: ImageId| reconstruction.cameras[reconstruction.images[i.index()].camera.index()].mean_focal();
-    let mut scores = vec![0.0f64; poses.len()];
+    // Of every image: the points that it shares, by their number in `image`, and their weights.
+    let mut shared: Vec<Vec<(usize, f64)>> = vec![Vec::new(); poses.len()];
     let mut angles = vec![Vec::new(); poses.len()];
-    for point in points_of(reconstruction, image).map(|(p, _)| p) {
+    let mut points = 0;
+    for (number, (point, _)) in points_of(reconstruction, image).enumerate() {
+        points = number + 1;
         let ray = point.xyz - centre;
         let gsd = pose.apply(&point.xyz).z / focal(image);
         for observation in &point.track {
@@ -53,15 +57,32 @@ pub fn select_views(reconstruction: &Reconstruction, image: ImageId, options: &V
             let narrow = (angle / options.good_angle).min(1.0);
             let wide = ((angle - options.wide_angle).max(0.0) / options.wide_angle.max(1e-9)).powi(2);
             let scale = (gsd / other_gsd).min(other_gsd / gsd);
-            scores[observation.image.index()] += narrow * narrow * (-2.0 * wide).exp() * scale;
+            shared[observation.image.index()].push((number, narrow * narrow * (-2.0 * wide).exp() * scale));
             angles[observation.image.index()].push(angle);
         }
     }
-    let mut found: Vec<usize> = (0..poses.len())
+    let mut candidates: Vec<usize> = (0..poses.len())
         .filter(|&i| angles[i].len() >= options.min_shared_points.max(1) && quantile(&mut angles[i], 0.5) >= options.min_angle)
         .collect();
-    found.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
-    found.into_iter().take(options.max_views).map(ImageId::new).collect()
+    let mut covered = vec![0.0f64; points];
+    let mut found = Vec::new();
+    while found.len() < options.max_views {
+        let score = |i: usize| shared[i].iter().map(|&(number, weight)| weight / (1.0 + covered[number])).sum::<f64>();
+        let mut best: Option<(f64, usize)> = None;
+        for (position, &candidate) in candidates.iter().enumerate() {
+            let score = score(candidate);
+            if best.is_none_or(|(highest, _)| score > highest) {
+                best = Some((score, position));
+            }
+        }
+        let Some((_, position)) = best else { break };
+        let taken = candidates.remove(position);
+        for &(number, weight) in &shared[taken] {
+            covered[number] += weight;
+        }
+        found.push(ImageId::new(taken));
+    }
+    found
 }
 
 /// Smallest and largest depth (z in the camera frame) at which surfaces of `image` are looked for.
@@ -174,6 +195,15 @@ mod tests {
         let two = ViewSelectionOptions { max_views: 2, ..Default::default() };
         assert_eq!(select_views(&scene, ImageId(0), &two), found[..2]);
         assert!(select_views(&scene, ImageId(77), &two).is_empty());
+    }
+
+    #[test]
+    fn every_part_of_the_image_gets_a_neighbour() {
+        // Three neighbours see the left two thirds alike, a fourth only the right half: it comes second though it shares the fewest points.
+        let x = |x: f64| Vector3::new(x, 0.0, 0.0);
+        let scene = wall(&[x(0.0), x(-3.0), x(-3.1), x(-2.9), x(4.5)], &[0.0; 5]);
+        let found = select_views(&scene, ImageId(0), &ViewSelectionOptions::default());
+        assert_eq!((found.len(), found[1]), (4, ImageId(4)), "{found:?}");
     }
 
     #[test]
