@@ -18,15 +18,48 @@ pub fn report(config: &Config, done: &BTreeMap<&'static str, Stamp>) -> Value {
         .filter_map(|stage| Some((stage.name, done.get(stage.name)?)))
         .flat_map(|(name, stamp)| stamp.warnings.iter().map(move |w| json!({"stage": name, "about": w.about, "message": w.message})))
         .collect();
+    let dense = ["quality", "maps", "depths", "points", "ground_sample_distance"];
     json!({
         "dive": config.name,
         "version": env!("CARGO_PKG_VERSION"),
         "images": {"found": figure("ingest", "found"), "total": figure("ingest", "usable"), "oriented": figure("orient", "oriented")},
         "frames": {"total": figure("ingest", "frames")},
-        "cameras": figure("ingest", "cameras"),
+        "cameras": cameras(figure("ingest", "cameras"), &figure("orient", "cameras")),
         "masks": part("mask", &["strategy", "masks", "empty", "masked_ratio"]),
+        "features": part("features", &["keypoints", "median"]),
+        "matching": part("matching", &["pairs_tried", "pairs_verified", "matches", "calibrated", "uncalibrated", "planar_or_panoramic"]),
+        "points": figure("orient", "points"),
+        "observations": figure("orient", "observations"),
+        "reprojection_rms_px": figure("orient", "reprojection_rms_px"),
+        "reprojection_mean_px": figure("orient", "reprojection_mean_px"),
+        "scale": figure("orient", "scale"),
+        "models": figure("orient", "models"),
+        "adjustment": figure("orient", "adjustment"),
+        "baselines": figure("orient", "baselines"),
+        "scale_bars": figure("orient", "scale_bars"),
+        "dense": part("densify", &dense),
+        "evaluation": evaluation(done.get("evaluate").map(|s| &s.figures)),
         "warnings": warnings,
     })
+}
+
+/// What the images say of each camera, and what the orientation found.
+fn cameras(ingested: Value, oriented: &Value) -> Value {
+    let Value::Array(mut cameras) = ingested else { return Value::Null };
+    for (i, camera) in cameras.iter_mut().enumerate() {
+        if let Value::Object(camera) = camera {
+            for key in ["model", "start", "params"] {
+                camera.insert(key.to_owned(), oriented[i][key].clone());
+            }
+        }
+    }
+    cameras.into()
+}
+
+/// The figures without the line for people.
+fn evaluation(figures: Option<&Value>) -> Value {
+    let Some(Value::Object(figures)) = figures else { return Value::Null };
+    figures.iter().filter(|(key, _)| *key != "note").map(|(k, v)| (k.clone(), v.clone())).collect::<Map<_, _>>().into()
 }
 
 /// The report with the time that each stage took, which is not the same in every run.

@@ -2,8 +2,10 @@
 
 pub mod densify;
 pub mod evaluate;
+pub mod features;
 pub mod images;
 pub mod ingest;
+pub mod interior;
 pub mod mask;
 pub mod model;
 mod pairing;

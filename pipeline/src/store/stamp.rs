@@ -150,4 +150,26 @@ mod tests {
             ]
         );
     }
+
+    /// A report that is made from a stamp read back must be the one made from the stamp in memory. Without the feature
+    /// `float_roundtrip` of serde_json some of these numbers come back one bit off.
+    #[test]
+    fn figures_survive_writing_and_reading_to_the_bit() {
+        let mut state = 1u64;
+        let values: Vec<f64> = std::iter::repeat_with(|| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / 9.007e15
+        })
+        .take(2000)
+        .collect();
+        let stamp = Stamp {
+            fingerprint: identity().fingerprint("mask"),
+            identity: identity(),
+            outputs: BTreeMap::new(),
+            figures: json!({ "values": values }),
+            warnings: Vec::new(),
+        };
+        let read: Stamp = serde_json::from_slice(&serde_json::to_vec_pretty(&stamp).unwrap()).unwrap();
+        assert_eq!(read, stamp);
+    }
 }

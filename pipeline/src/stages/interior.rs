@@ -1,0 +1,144 @@
+//! What the interior orientation of each camera starts from.
+
+use super::images::{CameraEntry, ImageList};
+use crate::config::{Config, InteriorConfig};
+use crate::store::Warning;
+use anyhow::{Result, bail};
+use scene::Camera;
+use scene::camera::ParamKind;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// The guess of a focal length of which nothing is known, over the longer side of the image: COLMAP's, a view of 45 degrees.
+const GUESS: f64 = 1.2;
+/// Largest difference of the aspects of a calibration and the images that it is used for.
+const ASPECT_TOLERANCE: f64 = 0.01;
+
+/// Where a start comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// dive.toml.
+    Given,
+    /// EXIF.
+    Exif,
+    /// Nothing.
+    Guess,
+}
+
+/// A start and where it comes from.
+#[derive(Clone, Debug)]
+pub struct Start {
+    /// Start values.
+    pub camera: Camera,
+    /// They are not refined.
+    pub fixed: bool,
+    /// Where they come from.
+    pub origin: Origin,
+}
+
+impl Start {
+    /// Whether the values come from a calibration or from EXIF, not from a guess.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.origin != Origin::Guess
+    }
+}
+
+/// The part of the configuration that decides the starts.
+#[must_use]
+pub fn options(config: &Config) -> Value {
+    json!(config.cameras.iter().map(|c| &c.interior).collect::<Vec<_>>())
+}
+
+/// The start of every camera. A camera without images gets one pixel and takes part in nothing.
+///
+/// # Errors
+/// When a given calibration cannot belong to the images.
+pub fn starts(config: &Config, list: &ImageList) -> Result<(Vec<Start>, Vec<Warning>)> {
+    let mut warnings = Vec::new();
+    let mut starts = Vec::with_capacity(list.cameras.len());
+    for (camera, entry) in config.cameras.iter().zip(&list.cameras) {
+        starts.push(start(&camera.interior, entry, &mut warnings)?);
+    }
+    Ok((starts, warnings))
+}
+
+fn start(interior: &InteriorConfig, entry: &CameraEntry, warnings: &mut Vec<Warning>) -> Result<Start> {
+    let (width, height) = entry.size.unwrap_or((1, 1));
+    if !interior.params.is_empty() {
+        let camera = given(interior, entry, (width, height), warnings)?;
+        return Ok(Start { camera, fixed: interior.fixed, origin: Origin::Given });
+    }
+    let (focal, origin) = match entry.exif_focal_px {
+        Some(focal) => (focal, Origin::Exif),
+        None => (GUESS * f64::from(width.max(height)), Origin::Guess),
+    };
+    let camera = Camera::from_focal(interior.model, width, height, focal)?;
+    Ok(Start { camera, fixed: false, origin })
+}
+
+fn given(interior: &InteriorConfig, entry: &CameraEntry, (width, height): (u32, u32), warnings: &mut Vec<Warning>) -> Result<Camera> {
+    let size = interior.size.unwrap_or((width, height));
+    let mut centre = [f64::from(size.0) / 2.0, f64::from(size.1) / 2.0].into_iter();
+    let mut params = Vec::with_capacity(interior.params.len());
+    for (value, kind) in interior.params.iter().zip(interior.model.param_kinds()) {
+        let default = if *kind == ParamKind::PrincipalPoint { centre.next().unwrap_or(0.0) } else { 0.0 };
+        params.push(value.unwrap_or(default));
+    }
+    let camera = Camera::new(interior.model, size.0, size.1, &params)?;
+    if size == (width, height) || entry.size.is_none() {
+        return Ok(camera);
+    }
+    let aspect = |(w, h): (u32, u32)| f64::from(w) / f64::from(h);
+    if (aspect(size) / aspect((width, height)) - 1.0).abs() > ASPECT_TOLERANCE {
+        bail!(
+            "the calibration of camera {} is for {} x {} pixels, its images have {width} x {height}: another aspect, so they are cut or turned\n  \
+             hint: calibrate with images of the size that is used",
+            entry.name,
+            size.0,
+            size.1
+        );
+    }
+    let message = format!("its calibration is for {} x {} pixels; it was scaled to the images' {width} x {height}", size.0, size.1);
+    warnings.push(Warning { about: entry.name.clone(), message });
+    Ok(camera.resized(width, height)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene::CameraModel;
+
+    fn entry(size: (u32, u32), exif_focal_px: Option<f64>) -> CameraEntry {
+        CameraEntry { name: "C1".to_owned(), size: Some(size), exif_focal_px }
+    }
+
+    fn given(params: Vec<Option<f64>>, size: Option<(u32, u32)>) -> InteriorConfig {
+        InteriorConfig { model: CameraModel::Pinhole, size, params, fixed: true }
+    }
+
+    #[test]
+    fn given_goes_before_exif_before_a_guess() {
+        let mut warnings = Vec::new();
+        let unknown = InteriorConfig::default();
+        let guess = start(&unknown, &entry((1000, 500), None), &mut warnings).unwrap();
+        assert_eq!((guess.origin, guess.is_known(), guess.camera.mean_focal()), (Origin::Guess, false, 1200.0));
+        let exif = start(&unknown, &entry((1000, 500), Some(900.0)), &mut warnings).unwrap();
+        assert_eq!((exif.origin, exif.is_known(), exif.camera.mean_focal()), (Origin::Exif, true, 900.0));
+        let known = given(vec![Some(800.0), Some(810.0), None, Some(240.0)], None);
+        let known = start(&known, &entry((1000, 500), Some(900.0)), &mut warnings).unwrap();
+        assert_eq!(known.camera.params(), [800.0, 810.0, 500.0, 240.0]);
+        assert!(known.fixed && warnings.is_empty());
+    }
+
+    #[test]
+    fn a_calibration_of_another_size_is_scaled_or_refused() {
+        let mut warnings = Vec::new();
+        let calibration = given(vec![Some(800.0), Some(800.0), None, None], Some((2000, 1000)));
+        let half = start(&calibration, &entry((1000, 500), None), &mut warnings).unwrap();
+        assert_eq!(half.camera.params(), [400.0, 400.0, 500.0, 250.0]);
+        assert_eq!(warnings.len(), 1);
+        assert!(start(&calibration, &entry((1000, 600), None), &mut warnings).is_err());
+    }
+}
