@@ -1,0 +1,27 @@
+//! Bundle adjustment: cameras, rigs, poses and points that best explain image observations, lengths and priors.
+//!
+//! The parts, in the order in which they work: [`problem`](Problem) is sorted into a `layout`, values live in `state`;
+//! `linearise` makes the normal equations of the observations and `lengths` those of everything else; `schur` eliminates
+//! the points into a system whose `pattern` is dense or sparse; `solve_reduced` factorises it; `step` goes back to the
+//! points and evaluates; `lm` decides.
+
+mod error;
+mod layout;
+mod lengths;
+mod linearise;
+mod lm;
+mod options;
+mod pattern;
+mod pieces;
+mod problem;
+mod schur;
+mod solve_reduced;
+mod state;
+mod step;
+mod summary;
+
+pub use error::AdjustError;
+pub use lm::adjust;
+pub use options::{AdjustOptions, Loss};
+pub use problem::{Baseline, CameraBlock, ImageObservation, ParamPrior, PointBlock, PoseBlock, PosePrior, Problem, ScaleBar};
+pub use summary::{AdjustSummary, LengthResidual, ParameterCounts, ReprojectionErrors, Termination};

@@ -1,0 +1,58 @@
+//! Settings of the adjustment.
+
+use super::error::AdjustError;
+pub use crate::robust::Loss;
+
+/// Settings of [`crate::adjust::adjust`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AdjustOptions {
+    /// Loss of the image observations. Lengths and priors always enter squared: an error in one shall show in its
+    /// residual, not vanish.
+    pub loss: Loss,
+    /// The largest number of steps tried, rejected ones included. Default 50.
+    pub max_iterations: usize,
+    /// Stop when a step changes the cost by less than this share of it. Default 1e-6.
+    pub function_tolerance: f64,
+    /// Stop when no component of the gradient is larger. Default 1e-10.
+    pub gradient_tolerance: f64,
+    /// Stop when the norm of a step is less than this share of the norm of the parameters. Default 1e-8.
+    pub parameter_tolerance: f64,
+    /// Radius of the first trust region: the first damping is the diagonal of the normal equations divided by it.
+    /// Default 1e4: nearly a Gauss-Newton step. Smaller values are for poor start values.
+    pub initial_radius: f64,
+}
+
+impl Default for AdjustOptions {
+    fn default() -> Self {
+        Self {
+            loss: Loss::Trivial,
+            max_iterations: 50,
+            function_tolerance: 1e-6,
+            gradient_tolerance: 1e-10,
+            parameter_tolerance: 1e-8,
+            initial_radius: 1e4,
+        }
+    }
+}
+
+impl AdjustOptions {
+    /// Refuses tolerances below zero, empty trust regions, loss scales that are not positive, and NaN.
+    pub(super) fn validate(&self) -> Result<(), AdjustError> {
+        let at_least_zero = [
+            ("function_tolerance", self.function_tolerance),
+            ("gradient_tolerance", self.gradient_tolerance),
+            ("parameter_tolerance", self.parameter_tolerance),
+        ];
+        for (name, value) in at_least_zero {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(AdjustError::BadOption { name, value });
+            }
+        }
+        for (name, value) in [("initial_radius", self.initial_radius), ("loss.scale_px", self.loss.scale_px().unwrap_or(1.0))] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(AdjustError::BadOption { name, value });
+            }
+        }
+        Ok(())
+    }
+}

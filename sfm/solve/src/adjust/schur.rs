@@ -1,0 +1,264 @@
+//! The reduced system: elimination of the points.
+//!
+//! A step (d, e) of kept blocks and points solves the damped normal equations
+//!
+//! ```text
+//! [ B   W ] [d]     [g]        B = F^T F + D_B,  W = F^T E,  C = E^T E + D_C,
+//! [ W^T C ] [e] = - [h]        g = F^T r,        h = E^T r.
+//! ```
+//!
+//! C is block-diagonal with a 3x3 block C_p for each point, since no residual meets two eliminated points. From the second
+//! row e = -C^-1 (h + W^T d), and the first becomes S d = -(g - W C^-1 h) with the Schur complement S = B - W C^-1 W^T:
+//!
+//! ```text
+//! S_ba = B_ba - sum over the points p that meet a and b of W_pb C_p^-1 W_pa^T.
+//! ```
+//!
+//! S is stored as *panels*: panel a holds the columns of kept block a, by columns, with the rows of the blocks b >= a
+//! that a meets. A panel is made by walking the points of a in order: Y = C_p^-1 W_pa^T once, then W_pb Y for each b from
+//! a on in the list of p. Each panel is written by one thread and summed in one order, so no bit depends on threads.
+//!
+//! Damping as in Ceres: D = diag(F^T F) / radius, after the scaled diagonal was clamped; see [`damping`].
+
+use super::layout::{Layout, NONE};
+use super::lengths::KeptNormal;
+use super::linearise::{Linearised, PointNormal};
+use super::pattern::Pattern;
+use super::pieces::{Sliced, for_each_piece};
+use scene::camera::MAX_CAMERA_PARAMS;
+
+/// The smallest share of a diagonal element that may remain as a pivot of a point's 3x3 matrix.
+const MIN_PIVOT: f64 = 1e-14;
+
+/// What is added to the diagonal element h = |column|^2 of the normal matrix.
+///
+/// Columns are thought of as scaled by s = 1 / (1 + |column|) (Jacobi scaling), the scaled diagonal h s^2 is kept within
+/// [1e-6, 1e32], divided by the radius, and scaled back: h / radius, but for columns below 1e-3. The scaling itself would
+/// not change a step beyond rounding (Cholesky's error does not depend on it: van der Sluis, 1969), so nothing is scaled.
+pub(super) fn damping(h: f64, radius: f64) -> f64 {
+    let norm = 1.0 + h.sqrt();
+    h.max(1e-6 * norm * norm).min(1e32 * norm * norm) / radius
+}
+
+/// The reduced system.
+#[derive(Debug)]
+pub(super) struct Reduced {
+    pub pattern: Pattern,
+    /// S; factorised in place where it is dense.
+    pub values: Vec<f64>,
+    /// -(g - W C^-1 h); becomes the step.
+    pub rhs: Vec<f64>,
+    /// g, of the kept blocks.
+    pub gradient: Vec<f64>,
+    /// Diagonal of D_B.
+    pub damping: Vec<f64>,
+    /// C_p^-1, lower triangle by rows, by slot.
+    pub point_inverse: Vec<[f64; 6]>,
+}
+
+impl Reduced {
+    pub fn new(layout: &Layout, kept: &KeptNormal) -> Self {
+        let pattern = Pattern::new(layout, kept);
+        let n = layout.unknowns();
+        Self {
+            values: vec![0.0; pattern.len()],
+            rhs: vec![0.0; n],
+            gradient: vec![0.0; n],
+            damping: vec![0.0; n],
+            point_inverse: vec![[0.0; 6]; layout.slot_count()],
+            pattern,
+        }
+    }
+
+    /// Eliminates the points for a trust region of the given radius.
+    pub fn build(&mut self, layout: &Layout, linear: &Linearised, kept: &KeptNormal, radius: f64, parallel: bool) {
+        let inverses = Sliced::new(&mut self.point_inverse, &layout.pieces.slots);
+        for_each_piece(0..layout.piece_count(), inverses, parallel, &|piece, inverses| {
+            for (inverse, normal) in inverses.into_inner().iter_mut().zip(&linear.points[layout.pieces.slots[piece]..]) {
+                *inverse = damped_inverse(&normal.h, radius);
+            }
+        });
+        let (pattern, point_inverse) = (&self.pattern, &self.point_inverse);
+        let data = (
+            Sliced::new(&mut self.values, &pattern.panel_start),
+            Sliced::new(&mut self.rhs, &layout.offsets),
+            Sliced::new(&mut self.gradient, &layout.offsets),
+            Sliced::new(&mut self.damping, &layout.offsets),
+        );
+        for_each_piece(0..layout.block_count(), data, parallel, &|a, (values, rhs, gradient, added)| {
+            let mut panel = Panel { values: values.into_inner(), rhs: rhs.into_inner(), gradient: gradient.into_inner(), added: added.into_inner() };
+            panel.sum_kept(layout, pattern, linear, kept, a);
+            panel.damp(pattern, a, radius);
+            panel.eliminate_points(layout, pattern, linear, point_inverse, a);
+        });
+    }
+}
+
+/// The columns of one kept block.
+struct Panel<'a> {
+    values: &'a mut [f64],
+    rhs: &'a mut [f64],
+    gradient: &'a mut [f64],
+    added: &'a mut [f64],
+}
+
+impl Panel<'_> {
+    /// B and g: the views and the residuals that meet kept blocks only.
+    fn sum_kept(&mut self, layout: &Layout, pattern: &Pattern, linear: &Linearised, kept: &KeptNormal, a: usize) {
+        let (dim_a, stride) = (self.rhs.len(), pattern.stride[a]);
+        self.values.fill(0.0);
+        self.gradient.copy_from_slice(&kept.gradient[layout.offsets[a]..][..dim_a]);
+        for &(v, segment) in &layout.block_views[layout.block_views_start[a]..layout.block_views_start[a + 1]] {
+            let view = &layout.views[v as usize];
+            let d = view.row_len();
+            let (h, g) = linear.views[linear.view_start[v as usize]..linear.view_start[v as usize + 1]].split_at(d * d);
+            let first = view.start[segment as usize] as usize;
+            for (sum, g) in self.gradient.iter_mut().zip(&g[first..]) {
+                *sum += g;
+            }
+            for below in (segment as usize..3).filter(|&k| view.block[k] != NONE) {
+                let row = pattern.row(a, view.block[below]);
+                let (start, dim_b) = (view.start[below] as usize, view.dim(below));
+                for j in 0..dim_a {
+                    let from = &h[(first + j) * d + start..][..dim_b];
+                    for (sum, h) in self.values[j * stride + row..][..dim_b].iter_mut().zip(from) {
+                        *sum += h;
+                    }
+                }
+            }
+        }
+        let first_pair = kept.pairs.partition_point(|&(c, _, _)| (c as usize) < a);
+        for &(_, b, start) in kept.pairs[first_pair..].iter().take_while(|&&(c, _, _)| c as usize == a) {
+            let (row, dim_b) = (pattern.row(a, b), layout.dim(b as usize));
+            for j in 0..dim_a {
+                for i in 0..dim_b {
+                    self.values[j * stride + row + i] += kept.values[start + j * dim_b + i];
+                }
+            }
+        }
+    }
+
+    fn damp(&mut self, pattern: &Pattern, a: usize, radius: f64) {
+        let row = pattern.row(a, a as u32);
+        for (j, added) in self.added.iter_mut().enumerate() {
+            let diagonal = &mut self.values[j * pattern.stride[a] + row + j];
+            *added = damping(*diagonal, radius);
+            *diagonal += *added;
+        }
+    }
+
+    fn eliminate_points(&mut self, layout: &Layout, pattern: &Pattern, linear: &Linearised, inverses: &[[f64; 6]], a: usize) {
+        let (dim_a, stride) = (self.rhs.len(), pattern.stride[a]);
+        let mut y = [[0.0; 3]; MAX_CAMERA_PARAMS];
+        let mut pair_rows = pattern.pair_rows(a);
+        for (rhs, g) in self.rhs.iter_mut().zip(&*self.gradient) {
+            *rhs = -g;
+        }
+        for &(slot, incidence) in &layout.block_points[layout.block_points_start[a]..layout.block_points_start[a + 1]] {
+            let [c00, c10, c11, c20, c21, c22] = inverses[slot as usize];
+            let h = &linear.points[slot as usize].g;
+            let w = &linear.w[layout.incidences[incidence as usize].w..][..3 * dim_a];
+            for j in 0..dim_a {
+                let (w0, w1, w2) = (w[j], w[dim_a + j], w[2 * dim_a + j]);
+                y[j] = [c00 * w0 + c10 * w1 + c20 * w2, c10 * w0 + c11 * w1 + c21 * w2, c20 * w0 + c21 * w1 + c22 * w2];
+                self.rhs[j] += y[j][0] * h[0] + y[j][1] * h[1] + y[j][2] * h[2];
+            }
+            let y = &y[..dim_a];
+            for other in &layout.incidences[incidence as usize..layout.slots[slot as usize + 1].first_incidence as usize] {
+                let row = pair_rows.next(&layout.offsets, other.block);
+                let dim_b = layout.dim(other.block as usize);
+                subtract_product(dim_b, &mut self.values[row..], stride, &linear.w[other.w..][..3 * dim_b], y);
+            }
+        }
+    }
+}
+
+/// Subtracts W Y from the rows at the start of `panel`; W has `dim` rows and stands by columns.
+#[inline]
+fn subtract_product(dim: usize, panel: &mut [f64], stride: usize, w: &[f64], y: &[[f64; 3]]) {
+    match dim {
+        1 => subtract_fixed::<1>(panel, stride, w, y),
+        2 => subtract_fixed::<2>(panel, stride, w, y),
+        3 => subtract_fixed::<3>(panel, stride, w, y),
+        4 => subtract_fixed::<4>(panel, stride, w, y),
+        5 => subtract_fixed::<5>(panel, stride, w, y),
+        6 => subtract_fixed::<6>(panel, stride, w, y),
+        7 => subtract_fixed::<7>(panel, stride, w, y),
+        8 => subtract_fixed::<8>(panel, stride, w, y),
+        9 => subtract_fixed::<9>(panel, stride, w, y),
+        _ => subtract_fixed::<10>(panel, stride, w, y),
+    }
+}
+
+#[inline(always)]
+fn subtract_fixed<const D: usize>(panel: &mut [f64], stride: usize, w: &[f64], y: &[[f64; 3]]) {
+    let (Ok(w0), Ok(w1), Ok(w2)) = (
+        <&[f64; D]>::try_from(&w[..D]),
+        <&[f64; D]>::try_from(&w[D..2 * D]),
+        <&[f64; D]>::try_from(&w[2 * D..3 * D]),
+    ) else {
+        unreachable!("slices of D elements")
+    };
+    for (j, y) in y.iter().enumerate() {
+        let column = &mut panel[j * stride..j * stride + D];
+        for i in 0..D {
+            column[i] -= w0[i] * y[0] + w1[i] * y[1] + w2[i] * y[2];
+        }
+    }
+}
+
+/// (h + D)^-1 of a point. A direction in which the point is not determined at all gets a tiny pivot instead of none: the
+/// trust region then rejects a wild step, and the other points do not suffer.
+fn damped_inverse(h: &[f64; 6], radius: f64) -> [f64; 6] {
+    let [h00, h10, h11, h20, h21, h22] = *h;
+    let (d0, d1, d2) = (h00 + damping(h00, radius), h11 + damping(h11, radius), h22 + damping(h22, radius));
+    let l00 = d0.sqrt();
+    let (l10, l20) = (h10 / l00, h20 / l00);
+    let l11 = (d1 - l10 * l10).max(MIN_PIVOT * d1).sqrt();
+    let l21 = (h21 - l20 * l10) / l11;
+    let l22 = (d2 - l20 * l20 - l21 * l21).max(MIN_PIVOT * d2).sqrt();
+    // M = L^-1, the inverse is M^T M.
+    let (m00, m11, m22) = (1.0 / l00, 1.0 / l11, 1.0 / l22);
+    let m10 = -l10 * m00 * m11;
+    let m21 = -l21 * m11 * m22;
+    let m20 = -(l20 * m00 + l21 * m10) * m22;
+    [
+        m00 * m00 + m10 * m10 + m20 * m20,
+        m11 * m10 + m21 * m20,
+        m11 * m11 + m21 * m21,
+        m22 * m20,
+        m22 * m21,
+        m22 * m22,
+    ]
+}
+
+/// The step of a point given W^T d: -C^-1 (h + W^T d).
+pub(super) fn point_step(normal: &PointNormal, inverse: &[f64; 6], w_step: &[f64; 3]) -> [f64; 3] {
+    let [c00, c10, c11, c20, c21, c22] = *inverse;
+    let [a, b, c] = [normal.g[0] + w_step[0], normal.g[1] + w_step[1], normal.g[2] + w_step[2]];
+    [-(c00 * a + c10 * b + c20 * c), -(c10 * a + c11 * b + c21 * c), -(c20 * a + c21 * b + c22 * c)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+
+    #[test]
+    fn damped_inverse_is_the_inverse() {
+        let e = Matrix3::new(3.0, 1.0, -2.0, 0.5, 4.0, 1.0, 0.1, -1.0, 2.0);
+        let h = e.transpose() * e;
+        let lower = [h[(0, 0)], h[(1, 0)], h[(1, 1)], h[(2, 0)], h[(2, 1)], h[(2, 2)]];
+        let damped = h + Matrix3::from_diagonal(&h.diagonal().map(|d| damping(d, 10.0)));
+        let [a, b, c, d, e, f] = damped_inverse(&lower, 10.0);
+        let inverse = Matrix3::new(a, b, d, b, c, e, d, e, f);
+        assert!((damped * inverse - Matrix3::identity()).norm() < 1e-14);
+    }
+
+    #[test]
+    fn points_without_depth_stay_finite() {
+        // E^T E of two observations along one ray.
+        let inverse = damped_inverse(&[2.0, 0.0, 2.0, 0.0, 0.0, 0.0], 1e16);
+        assert!(inverse.iter().all(|x| x.is_finite()));
+    }
+}

@@ -1,0 +1,107 @@
+//! Cholesky factorisation of the reduced system, by faer: dense, or sparse with one symbolic analysis for all iterations.
+//!
+//! Everything runs on one thread: faer's single-column solve gives other bits on several, and its sparse factorisation
+//! is slower there.
+
+use super::error::AdjustError;
+use super::layout::Layout;
+use super::pattern::{Pattern, SparsePattern};
+use super::schur::Reduced;
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::cholesky::llt::{factor, solve};
+use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side};
+
+/// Symbolic analysis and workspace.
+pub(super) struct Solver {
+    workspace: MemBuffer,
+    sparse: Option<Sparse>,
+}
+
+struct Sparse {
+    column_start: Vec<usize>,
+    row_index: Vec<usize>,
+    symbolic: SymbolicCholesky<usize>,
+    factor: Vec<f64>,
+}
+
+impl Solver {
+    pub fn new(layout: &Layout, pattern: &Pattern) -> Result<Self, AdjustError> {
+        let unknowns = layout.unknowns();
+        let out_of_memory = AdjustError::OutOfMemory { unknowns };
+        let (request, sparse) = match &pattern.sparse {
+            None => (factor::cholesky_in_place_scratch::<f64>(unknowns, Par::Seq, Default::default()), None),
+            Some(rows) => {
+                let sparse = Sparse::new(layout, pattern, rows).ok_or(out_of_memory.clone())?;
+                let request = StackReq::or(
+                    sparse.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
+                    sparse.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+                );
+                (request, Some(sparse))
+            }
+        };
+        let workspace = MemBuffer::try_new(request).map_err(|_| out_of_memory)?;
+        Ok(Self { workspace, sparse })
+    }
+
+    /// Turns the right-hand side of `reduced` into the step; false when the matrix is not positive definite.
+    pub fn solve(&mut self, reduced: &mut Reduced) -> bool {
+        let n = reduced.rhs.len();
+        if n == 0 {
+            return true;
+        }
+        let stack = MemStack::new(&mut self.workspace);
+        let rhs = MatMut::from_column_major_slice_mut(&mut reduced.rhs, n, 1);
+        match &mut self.sparse {
+            None => {
+                let mut matrix = MatMut::from_column_major_slice_mut(&mut reduced.values, n, n);
+                if factor::cholesky_in_place(matrix.as_mut(), Default::default(), Par::Seq, stack, Default::default()).is_err() {
+                    return false;
+                }
+                solve::solve_in_place(matrix.as_ref(), rhs, Par::Seq, stack);
+            }
+            Some(sparse) => {
+                let structure = SymbolicSparseColMatRef::new_checked(n, n, &sparse.column_start, None, &sparse.row_index);
+                let matrix = SparseColMatRef::new(structure, &reduced.values);
+                let factored = sparse.symbolic.factorize_numeric_llt(
+                    &mut sparse.factor,
+                    matrix,
+                    Side::Lower,
+                    Default::default(),
+                    Par::Seq,
+                    stack,
+                    Default::default(),
+                );
+                let Ok(factor): Result<LltRef<'_, usize, f64>, _> = factored else {
+                    return false;
+                };
+                factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
+            }
+        }
+        reduced.rhs.iter().all(|d| d.is_finite())
+    }
+}
+
+impl Sparse {
+    /// The panels as compressed columns: the values of a column of a panel stand one after the other. Those above the
+    /// diagonal inside a diagonal block are stored and ignored.
+    fn new(layout: &Layout, pattern: &Pattern, rows: &SparsePattern) -> Option<Self> {
+        let n = layout.unknowns();
+        let mut column_start = vec![0];
+        let mut row_index = Vec::with_capacity(pattern.len());
+        for a in 0..layout.block_count() {
+            for _ in 0..layout.dim(a) {
+                for &(b, _) in &rows.rows[rows.rows_start[a]..rows.rows_start[a + 1]] {
+                    row_index.extend(layout.offsets[b as usize]..layout.offsets[b as usize + 1]);
+                }
+                column_start.push(row_index.len());
+            }
+        }
+        let structure = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &row_index);
+        let symbolic =
+            factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, CholeskySymbolicParams::default()).ok()?;
+        let factor = vec![0.0; symbolic.len_val()];
+        Some(Self { column_start, row_index, symbolic, factor })
+    }
+}
