@@ -163,29 +163,7 @@ fn help_explains_every_key_of_the_report() {
     let report: serde_json::Value = serde_json::from_str(&dive.ok(&["run", "--until", "ingest", "--json"])).unwrap();
     let help = dive.ok(&["help", "json"]);
     let known: Vec<&str> = help.lines().filter_map(|l| l.split_whitespace().next()).collect();
-    let mut keys = Vec::new();
-    collect_keys(&report, "", &mut keys);
-    for key in keys {
+    for key in support::keys(&report) {
         assert!(known.contains(&key.as_str()), "{key} is not explained");
-    }
-}
-
-/// Paths of the leaves; names that data bring are `*`.
-fn collect_keys(value: &serde_json::Value, path: &str, keys: &mut Vec<String>) {
-    match value {
-        serde_json::Value::Object(map) => {
-            for (name, below) in map {
-                let free = path == "stages" || path == "cameras[].params" || path == "evaluation.c2m_percentiles_m";
-                let name = if free { "*" } else { name };
-                collect_keys(below, &if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }, keys);
-            }
-        }
-        serde_json::Value::Array(items) if items.iter().any(serde_json::Value::is_object) => {
-            items.iter().for_each(|item| collect_keys(item, &format!("{path}[]"), keys));
-        }
-        // An empty list, or null for a table whose stage was not done.
-        serde_json::Value::Array(items) if items.is_empty() => {}
-        serde_json::Value::Null => {}
-        _ => keys.push(path.to_owned()),
     }
 }

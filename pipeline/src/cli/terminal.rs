@@ -9,6 +9,9 @@ use std::time::{Duration, Instant};
 /// How often a plain line tells how far a long stage is.
 const LINE_EVERY: Duration = Duration::from_secs(30);
 
+/// How often the times of a bar move on, also when no item is done.
+const TICK: Duration = Duration::from_millis(500);
+
 /// Writes to stderr.
 pub(super) struct Terminal {
     interactive: bool,
@@ -55,12 +58,19 @@ impl Progress for Terminal {
         state.bar.finish_and_clear();
         (state.what, state.total, state.count) = (what.to_owned(), total, 0);
         if self.interactive {
-            let template = "{prefix:<10} {msg} {wide_bar} {pos}/{len} {per_sec} {eta} left";
+            // Of some work it is not known how much there is.
+            let template = if total > 0 {
+                "{prefix:<10} {msg} {wide_bar} {pos}/{len} {per_sec} {eta} left"
+            } else {
+                "{prefix:<10} {msg} {spinner} {elapsed}"
+            };
             let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-            state.bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr())
+            let length = (total > 0).then_some(total as u64);
+            state.bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::stderr())
                 .with_style(style)
                 .with_prefix(state.stage.clone())
                 .with_message(state.what.clone());
+            state.bar.enable_steady_tick(TICK);
         }
     }
 

@@ -1,7 +1,6 @@
 //! How far the cloud is from the truth, where a truth is known.
 
-use super::images::ImageList;
-use super::{densify, mask, model};
+use super::{densify, model};
 use crate::config::Config;
 use crate::reference::{read_positions, read_reference};
 use crate::stage::{Outcome, Stage, Work};
@@ -16,7 +15,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "evaluate", version: 1, upstream: &["ingest", "mask", "orient", "densify"], options, inputs, work };
+pub const STAGE: Stage = Stage { name: "evaluate", version: 1, upstream: &["mask", "orient", "densify"], options, inputs, work };
 
 /// The figures.
 const METRICS: &str = "eval/metrics.json";
@@ -35,11 +34,11 @@ fn inputs(config: &Config, hashes: &Hashes) -> BTreeMap<String, String> {
 }
 
 fn work(work: &Work<'_>) -> Result<Outcome> {
-    let list = ImageList::load(work)?;
     let model = model::load(work)?;
     let (cloud, _) = read_ply_cloud(work.read("densify", densify::CLOUD)?.as_slice()).context(densify::CLOUD)?;
     let mut warnings = Vec::new();
-    let mut figures = json!({"points": cloud.len(), "masked_ratio": masked_ratio(work, &list)?});
+    let masked_ratio = work.done.get("mask").map(|stamp| stamp.figures["masked_ratio"].clone());
+    let mut figures = json!({"points": cloud.len(), "masked_ratio": masked_ratio});
     let moved = match &work.config.evaluate.positions {
         Some(path) => {
             let known = read_positions(path)?;
@@ -83,15 +82,6 @@ fn merge(into: &mut Value, from: Value) {
     if let (Value::Object(into), Value::Object(from)) = (into, from) {
         into.extend(from);
     }
-}
-
-/// Share of the pixels that masks take away; `None` without masks.
-fn masked_ratio(work: &Work<'_>, list: &ImageList) -> Result<Option<f64>> {
-    let mut ratios = Vec::new();
-    for image in &list.images {
-        ratios.extend(mask::load(work, list, image)?.map(|m| masking::masked_ratio(&m)));
-    }
-    Ok((!ratios.is_empty()).then(|| ratios.iter().sum::<f64>() / ratios.len() as f64))
 }
 
 /// Moves the model to known positions of its projection centres: rigidly where it is metric, with scale where not.
