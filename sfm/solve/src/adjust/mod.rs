@@ -19,6 +19,8 @@ mod solve_reduced;
 mod state;
 mod step;
 mod summary;
+#[cfg(test)]
+mod tests;
 
 pub use error::AdjustError;
 pub use lm::adjust;

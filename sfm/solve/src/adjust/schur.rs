@@ -58,7 +58,10 @@ pub(super) struct Reduced {
 
 impl Reduced {
     pub fn new(layout: &Layout, kept: &KeptNormal) -> Self {
-        let pattern = Pattern::new(layout, kept);
+        Self::with_pattern(layout, Pattern::new(layout, kept))
+    }
+
+    pub fn with_pattern(layout: &Layout, pattern: Pattern) -> Self {
         let n = layout.unknowns();
         Self {
             values: vec![0.0; pattern.len()],

@@ -1,0 +1,9 @@
+//! Tests of the adjuster.
+
+mod edges;
+mod lengths;
+mod normal_equations;
+mod oracle;
+mod robustness;
+mod scene;
+mod truth;

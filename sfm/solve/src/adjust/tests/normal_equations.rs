@@ -1,0 +1,157 @@
+//! Jacobians, elimination and back-substitution against dense algebra from the definitions.
+
+use super::oracle::{Unknown, jacobian, residuals, unknowns};
+use super::scene::{Options, free_camera, perturb, truth};
+use crate::adjust::layout::{Layout, Owner};
+use crate::adjust::lengths::KeptNormal;
+use crate::adjust::linearise::Linearised;
+use crate::adjust::pattern::Pattern;
+use crate::adjust::schur::{Reduced, damping};
+use crate::adjust::solve_reduced::Solver;
+use crate::adjust::state::State;
+use crate::adjust::step::Stepper;
+use crate::adjust::*;
+use ::scene::CameraModel;
+use nalgebra::{DMatrix, DVector};
+
+const RADIUS: f64 = 50.0;
+
+/// What the adjuster makes of a problem in one iteration.
+struct Iteration {
+    cost: f64,
+    gradient: Vec<f64>,
+    step: Vec<f64>,
+    model_decrease: f64,
+    after: State,
+}
+
+/// Unknowns in the adjuster's order.
+fn layout_order(problem: &Problem, layout: &Layout) -> Vec<Unknown> {
+    let kept = layout.owners.iter().flat_map(|&owner| match owner {
+        Owner::Frame(i) => (0..6).map(|k| Unknown::Frame(i as usize, k)).collect::<Vec<_>>(),
+        Owner::Sensor(i) => (0..6).map(|k| Unknown::Sensor(i as usize, k)).collect(),
+        Owner::Camera(i) => layout.camera_free[i as usize].indices().map(|k| Unknown::Camera(i as usize, k)).collect(),
+        Owner::Point(i) => (0..3).map(|k| Unknown::Point(layout.kept_points[i as usize] as usize, k)).collect(),
+    });
+    let slots = layout.slots[..layout.slot_count()].iter().filter(|s| s.free);
+    let all: Vec<_> = kept.chain(slots.flat_map(|s| (0..3).map(|k| Unknown::Point(s.point as usize, k)))).collect();
+    assert_eq!(all.len(), unknowns(problem).len());
+    all
+}
+
+fn iterate(problem: &Problem, make_pattern: impl Fn(&Layout, &KeptNormal) -> Pattern) -> (Vec<Unknown>, Iteration) {
+    let loss = Loss::Trivial;
+    let mut state = State::new(problem);
+    let layout = Layout::new(problem, &mut state);
+    state.load_points(problem, &layout);
+    let mut linear = Linearised::new(&layout);
+    let mut kept = KeptNormal::new(problem, &layout, &state, &loss);
+    let cost = linear.update(&layout, &state, &loss, false) + kept.update(problem, &layout, &state, &loss);
+    let mut reduced = Reduced::with_pattern(&layout, make_pattern(&layout, &kept));
+    let mut solver = Solver::new(&layout, &reduced.pattern).expect("memory");
+    reduced.build(&layout, &linear, &kept, RADIUS, false);
+    assert!(solver.solve(&mut reduced));
+    let mut after = state.clone();
+    assert!(after.set_moved(&state, &reduced.rhs, &layout));
+    let sums = Stepper::new(&layout).step(&layout, &linear, &reduced, RADIUS, &loss, &state, &mut after, false);
+    let (mut step, mut gradient) = (reduced.rhs.clone(), reduced.gradient.clone());
+    for (s, slot) in layout.slots[..layout.slot_count()].iter().enumerate().filter(|(_, s)| s.free) {
+        step.extend((0..3).map(|k| after.points[s][k] - state.points[s][k]));
+        gradient.extend(linear.points[s].g);
+        assert!(slot.free);
+    }
+    (layout_order(problem, &layout), Iteration { cost, gradient, step, model_decrease: sums.model_decrease, after })
+}
+
+/// Compares an iteration with dense algebra; the residuals are smooth and the Jacobian by differences of the fourth order
+/// errs by about 1e-9 of its largest element, which the damped system magnifies little.
+fn check(problem: &Problem, make_pattern: impl Fn(&Layout, &KeptNormal) -> Pattern) {
+    let (order, found) = iterate(problem, make_pattern);
+    let j = jacobian(problem, &order);
+    let r = DVector::from_vec(residuals(problem));
+    assert!((found.cost - 0.5 * r.norm_squared()).abs() < 1e-12 * found.cost, "cost {} {}", found.cost, 0.5 * r.norm_squared());
+    let g = j.transpose() * &r;
+    let found_g = DVector::from_vec(found.gradient);
+    for i in 0..g.len() {
+        let scale = j.column(i).norm() * r.norm();
+        assert!((found_g[i] - g[i]).abs() < 1e-8 * scale, "gradient of {:?}: {} {}", order[i], found_g[i], g[i]);
+    }
+    let h = j.transpose() * &j;
+    let d = h.diagonal().map(|h| damping(h, RADIUS));
+    let step = (&h + DMatrix::from_diagonal(&d)).cholesky().expect("damped").solve(&-&g);
+    let found_step = DVector::from_vec(found.step);
+    // In units of what each unknown does to the residuals.
+    let scaled = |s: &DVector<f64>| s.component_mul(&h.diagonal().map(f64::sqrt));
+    let error = (scaled(&found_step) - scaled(&step)).norm() / scaled(&step).norm();
+    assert!(error < 1e-6, "step errs by {error}");
+    let decrease = 0.5 * r.norm_squared() - 0.5 * (&r + &j * &step).norm_squared();
+    assert!((found.model_decrease - decrease).abs() < 1e-6 * decrease, "{} {decrease}", found.model_decrease);
+    assert!(found.after.points.iter().flatten().all(|x| x.is_finite()));
+}
+
+/// A rig of three with free sensors, cameras, lengths and priors: every kind of block and residual.
+fn everything(model: CameraModel, sensors: usize) -> Problem {
+    let mut problem = truth(&Options { frames: 4, sensors, points: 14, track: 3, noise_px: 0.5, model, ..Options::default() });
+    problem.cameras.iter_mut().for_each(free_camera);
+    problem.cameras[0].priors[0] = Some(ParamPrior { value: 890.0, sigma: 5.0 });
+    for (i, o) in problem.observations.iter_mut().enumerate() {
+        o.sigma_px = 0.5 + 0.1 * (i % 7) as f64;
+    }
+    let prior = |pose| Some(PosePrior { pose, sigma_rotation_rad: 0.02, sigma_translation: 0.03 });
+    problem.frames[1].prior = prior(problem.frames[1].pose);
+    problem.frames[0].free = false;
+    problem.points[3].free = false;
+    problem.points[5].free = false;
+    problem.scale_bars = vec![
+        ScaleBar { a: 0, b: 7, length: 0.8, sigma: 0.01 },
+        ScaleBar { a: 7, b: 5, length: 0.7, sigma: 0.02 },
+        ScaleBar { a: 13, b: 1, length: 0.5, sigma: 0.02 },
+    ];
+    problem.baselines = vec![Baseline { a: (1, 0), b: (3, 0), length: 0.95, sigma: 0.01 }, Baseline { a: (0, 0), b: (2, 0), length: 0.8, sigma: 0.02 }];
+    if sensors > 1 {
+        problem.sensors[1].prior = prior(problem.sensors[1].pose);
+        problem.baselines.push(Baseline { a: (2, 0), b: (2, 1), length: 0.31, sigma: 0.005 });
+        problem.baselines.push(Baseline { a: (1, 1), b: (3, 1), length: 0.9, sigma: 0.02 });
+    }
+    perturb(&mut problem, 0.01, 3);
+    problem
+}
+
+#[test]
+fn a_step_solves_the_normal_equations() {
+    for model in CameraModel::ALL {
+        for sensors in [1, 3] {
+            check(&everything(model, sensors), |layout, _| Pattern::dense(layout));
+        }
+    }
+}
+
+#[test]
+fn a_sparse_step_solves_the_normal_equations() {
+    for sensors in [1, 3] {
+        check(&everything(CameraModel::OpenCv, sensors), Pattern::sparse);
+    }
+    // A chain: frames far apart do not meet.
+    let mut chain = truth(&Options { frames: 9, points: 40, track: 3, arc: 0.05, noise_px: 0.5, ..Options::default() });
+    perturb(&mut chain, 0.01, 4);
+    check(&chain, |layout, kept| {
+        let pattern = Pattern::sparse(layout, kept);
+        // 9 diagonal blocks, and each frame meets the next two.
+        assert_eq!(pattern.len(), (9 + 8 + 7) * 36);
+        pattern
+    });
+}
+
+#[test]
+fn fixed_blocks_have_no_unknowns() {
+    let mut problem = everything(CameraModel::Radial, 3);
+    problem.sensors.iter_mut().for_each(|s| s.free = false);
+    check(&problem, |layout, _| Pattern::dense(layout));
+    problem.frames.iter_mut().for_each(|f| f.free = false);
+    check(&problem, |layout, _| Pattern::dense(layout));
+    problem.cameras.iter_mut().for_each(|c| c.free = [false; 10]);
+    check(&problem, |layout, _| Pattern::dense(layout));
+    let mut problem = everything(CameraModel::Radial, 3);
+    problem.points.iter_mut().for_each(|p| p.free = false);
+    check(&problem, |layout, _| Pattern::dense(layout));
+}
