@@ -14,6 +14,7 @@ pub mod plan;
 pub mod progress;
 pub mod recipe;
 pub mod reference;
+pub mod report;
 pub mod run;
 pub mod stage;
 pub mod stages;

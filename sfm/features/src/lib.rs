@@ -1,7 +1,12 @@
 //! Features of images: extraction, matching and geometric verification.
 
 mod error;
+mod matching;
+pub mod pairs;
 mod sift;
+mod verify;
 
 pub use error::FeatureError;
+pub use matching::{MatchOptions, match_descriptors};
 pub use sift::{SiftOptions, extract};
+pub use verify::{ImageForPair, PairVerdict, VerifyOptions, verify_pair};

@@ -1,1 +1,33 @@
-//! Package `mapping`.
+//! Orientation: from verified pairs to posed frames, interior orientation and scene points.
+//!
+//! [`orient`] is the way in. It builds the correspondence graph, starts from a well-chosen pair (or from one exposure of
+//! a calibrated rig), registers one frame after the other, and adjusts all of it with [`solve::adjust`]. Everything is a
+//! plain function over plain values; the same input gives the same bits.
+//!
+//! The route is the incremental one of Schoenberger & Frahm, *Structure-from-Motion Revisited*, CVPR 2016, with frames
+//! (one pose for all images of a rig) in the place of images.
+
+mod adjustment;
+mod attempt;
+mod error;
+mod filter;
+mod frames;
+mod graph;
+mod incremental;
+mod initial;
+mod input;
+mod lengths;
+mod model;
+mod options;
+mod orient;
+mod register;
+mod rig;
+mod summary;
+mod triangulation;
+mod visibility;
+
+pub use error::MapError;
+pub use input::{BaselineInput, CameraInput, ImageInput, ImagePick, MapInput, RigInput, RigMode, RigPoseInput, ScaleBarInput};
+pub use options::OrientOptions;
+pub use orient::orient;
+pub use summary::{BaselineReport, LeftOut, OrientSummary, Orientation, ScaleBarReport};

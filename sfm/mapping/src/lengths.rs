@@ -1,0 +1,192 @@
+//! Known lengths: baselines between cameras and scale bars in the scene.
+
+use crate::input::{ImagePick, RigMode, ScaleBarInput};
+use crate::model::Model;
+use crate::summary::{BaselineReport, ScaleBarReport};
+use nalgebra::{Vector2, Vector3};
+use scene::{ImageId, Similarity3};
+use solve::adjust::{Baseline, ImageObservation, PointBlock, Problem, ScaleBar};
+use solve::triangulate::{View, triangulate};
+use std::collections::BTreeMap;
+
+/// Baselines and scale bars of a model that take part in its adjustment.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Lengths {
+    baselines: Vec<KnownBaseline>,
+    bars: Vec<KnownBar>,
+}
+
+#[derive(Clone, Debug)]
+struct KnownBaseline {
+    images: (ImageId, ImageId),
+    length: f64,
+    sigma: f64,
+}
+
+#[derive(Clone, Debug)]
+struct KnownBar {
+    ends: [Vec<ImagePick>; 2],
+    start: [Vector3<f64>; 2],
+    length: f64,
+    sigma: f64,
+}
+
+impl Lengths {
+    /// The lengths that the oriented images of the model measure.
+    pub(crate) fn of(model: &Model) -> Self {
+        let rig = &model.input.rig;
+        let baselines = match rig.mode {
+            RigMode::None => Vec::new(),
+            // One pose a frame: a baseline is one and the same in every exposure and counts once.
+            RigMode::Rigid => rig.baselines.iter().filter_map(|b| Some((b, *simultaneous(model, b.cameras).first()?))).map(known).collect(),
+            RigMode::Baselines => rig
+                .baselines
+                .iter()
+                .flat_map(|b| simultaneous(model, b.cameras).into_iter().map(move |images| known((b, images))))
+                .collect(),
+        };
+        let bars = model
+            .input
+            .scale_bars
+            .iter()
+            .filter(|bar| !bar.check)
+            .filter_map(|bar| {
+                let start = bar_ends(model, bar)?;
+                Some(KnownBar { ends: bar.ends.clone(), start, length: bar.length_m, sigma: bar.sigma_m })
+            })
+            .collect();
+        Self { baselines, bars }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.baselines.is_empty() && self.bars.is_empty()
+    }
+
+    /// Metres in one unit of the model: the weighted mean over all lengths of given / found.
+    pub(crate) fn scale(&self, model: &Model) -> Option<f64> {
+        let found = self
+            .baselines
+            .iter()
+            .filter_map(|b| Some((distance(model, b.images)?, b.length, b.sigma)))
+            .chain(self.bars.iter().map(|bar| ((bar.start[0] - bar.start[1]).norm(), bar.length, bar.sigma)));
+        // Least squares of length = scale * found, each with its sigma.
+        let (mut up, mut down) = (0.0, 0.0);
+        for (found, given, sigma) in found {
+            up += given * found / (sigma * sigma);
+            down += found * found / (sigma * sigma);
+        }
+        (down > 0.0).then(|| up / down).filter(|s| s.is_finite() && *s > 0.0)
+    }
+
+    /// Adds the lengths to an adjustment; `sensor_of` gives frame and sensor of an image.
+    pub(crate) fn add_to(
+        &self,
+        problem: &mut Problem,
+        sensor_of: impl Fn(ImageId) -> Option<(u32, u32)>,
+        observe: impl Fn(ImageId, u32, Vector2<f64>) -> Option<ImageObservation>,
+    ) {
+        for b in &self.baselines {
+            if let (Some(a), Some(b_end)) = (sensor_of(b.images.0), sensor_of(b.images.1)) {
+                problem.baselines.push(Baseline { a, b: b_end, length: b.length, sigma: b.sigma });
+            }
+        }
+        for bar in &self.bars {
+            let first = problem.points.len() as u32;
+            for (end, start) in bar.ends.iter().zip(bar.start) {
+                let point = problem.points.len() as u32;
+                problem.points.push(PointBlock { xyz: start, free: true });
+                problem.observations.extend(end.iter().filter_map(|pick| observe(pick.image, point, Vector2::from(pick.pixel))));
+            }
+            problem.scale_bars.push(ScaleBar { a: first, b: first + 1, length: bar.length, sigma: bar.sigma });
+        }
+    }
+}
+
+fn known((baseline, images): (&crate::input::BaselineInput, (ImageId, ImageId))) -> KnownBaseline {
+    KnownBaseline { images, length: baseline.length_m, sigma: baseline.sigma_m }
+}
+
+/// Oriented images of both cameras in the same exposure.
+fn simultaneous(model: &Model, cameras: (scene::CameraId, scene::CameraId)) -> Vec<(ImageId, ImageId)> {
+    let mut by_exposure: BTreeMap<u32, [Option<ImageId>; 2]> = BTreeMap::new();
+    for image in model.oriented_images() {
+        let camera = model.images[image.index()].camera;
+        let exposure = model.frames[model.images[image.index()].frame.index()].exposure;
+        let slots = by_exposure.entry(exposure).or_default();
+        if camera == cameras.0 {
+            slots[0] = Some(image);
+        }
+        if camera == cameras.1 {
+            slots[1] = Some(image);
+        }
+    }
+    by_exposure.into_values().filter_map(|[a, b]| Some((a?, b?))).collect()
+}
+
+fn distance(model: &Model, images: (ImageId, ImageId)) -> Option<f64> {
+    Some((model.cam_from_world(images.0)?.centre() - model.cam_from_world(images.1)?.centre()).norm())
+}
+
+/// Both ends of a scale bar from the images in which they were picked.
+fn bar_ends(model: &Model, bar: &ScaleBarInput) -> Option<[Vector3<f64>; 2]> {
+    let end = |picks: &[ImagePick]| {
+        let views: Vec<View> = picks
+            .iter()
+            .filter_map(|pick| {
+                let cam_from_world = model.cam_from_world(pick.image)?;
+                View::new(*model.camera(pick.image), &cam_from_world, Vector2::from(pick.pixel))
+            })
+            .collect();
+        if views.len() < 2 { None } else { triangulate(&views) }
+    };
+    Some([end(&bar.ends[0])?, end(&bar.ends[1])?])
+}
+
+/// Changes the unit of the world.
+pub(crate) fn rescale(model: &mut Model, scale: f64) {
+    let world = Similarity3::from_scale(scale);
+    for frame in &mut model.frames {
+        frame.rig_from_world = frame.rig_from_world.map(|pose| pose.in_new_world(&world));
+    }
+    for rig in &mut model.rigs {
+        for sensor in &mut rig.sensors {
+            sensor.cam_from_rig.translation *= scale;
+        }
+    }
+    let moved: Vec<_> = model.points().map(|(id, p)| (id, p.xyz * scale)).collect();
+    for (id, xyz) in moved {
+        model.set_xyz(id, xyz);
+    }
+}
+
+/// Given and found baselines.
+pub(crate) fn report_baselines(model: &Model) -> Vec<BaselineReport> {
+    let rig = &model.input.rig;
+    rig.baselines
+        .iter()
+        .filter_map(|b| {
+            let found: Vec<f64> = simultaneous(model, b.cameras).into_iter().filter_map(|images| distance(model, images)).collect();
+            let n = found.len() as f64;
+            (!found.is_empty()).then(|| BaselineReport {
+                cameras: b.cameras,
+                given_m: b.length_m,
+                found_m: found.iter().sum::<f64>() / n,
+                sigma_m: b.sigma_m,
+                normalised_residual: (found.iter().map(|f| ((f - b.length_m) / b.sigma_m).powi(2)).sum::<f64>() / n).sqrt(),
+                exposures: found.len(),
+            })
+        })
+        .collect()
+}
+
+/// Given and found scale bars.
+pub(crate) fn report_bars(model: &Model) -> Vec<ScaleBarReport> {
+    let bars = model.input.scale_bars.iter().enumerate();
+    bars.map(|(index, bar)| ScaleBarReport {
+        index,
+        given_m: bar.length_m,
+        found_m: bar_ends(model, bar).map(|[a, b]| (a - b).norm()),
+        check: bar.check,
+    })
+    .collect()
+}

@@ -1,0 +1,67 @@
+//! What came out of an orientation.
+
+use scene::{CameraId, ImageId, Reconstruction};
+use solve::adjust::AdjustSummary;
+
+/// Models and figures.
+#[derive(Clone, Debug)]
+pub struct Orientation {
+    /// Models, the one with most images first. They do not share frames.
+    pub models: Vec<Reconstruction>,
+    /// Figures of the first model, and what was left out.
+    pub summary: OrientSummary,
+}
+
+/// Figures of an orientation.
+#[derive(Clone, Debug)]
+pub struct OrientSummary {
+    /// The last adjustment of the first model.
+    pub adjustment: AdjustSummary,
+    /// Images in no model, and why.
+    pub left_out: Vec<LeftOut>,
+    /// Known baselines and what was found.
+    pub baselines: Vec<BaselineReport>,
+    /// Known lengths in the scene and what was found.
+    pub scale_bars: Vec<ScaleBarReport>,
+    /// Decisions that a user should know of.
+    pub notes: Vec<String>,
+}
+
+/// An image that could not be oriented.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeftOut {
+    /// The image.
+    pub image: ImageId,
+    /// Why.
+    pub reason: String,
+}
+
+/// A known baseline and what was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaselineReport {
+    /// The cameras.
+    pub cameras: (CameraId, CameraId),
+    /// Given length, metres.
+    pub given_m: f64,
+    /// Mean over the exposures, metres.
+    pub found_m: f64,
+    /// Given standard deviation, metres.
+    pub sigma_m: f64,
+    /// Root mean square over the exposures of (found - given) / sigma.
+    pub normalised_residual: f64,
+    /// Exposures in which both cameras are oriented.
+    pub exposures: usize,
+}
+
+/// A known length in the scene and what was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScaleBarReport {
+    /// Position in the input.
+    pub index: usize,
+    /// Given length, metres.
+    pub given_m: f64,
+    /// Found length, metres; `None` when an end is picked in fewer than two oriented images.
+    pub found_m: Option<f64>,
+    /// Took no part in the adjustment.
+    pub check: bool,
+}
