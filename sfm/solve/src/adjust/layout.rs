@@ -281,11 +281,8 @@ impl Layout {
             self.kept_block.push(block);
         }
         for view in &mut self.views {
-            view.block = [
-                self.frame_block[view.frame as usize],
-                self.sensor_block[view.sensor as usize],
-                self.camera_block[view.camera as usize],
-            ];
+            view.block =
+                [self.frame_block[view.frame as usize], self.sensor_block[view.sensor as usize], self.camera_block[view.camera as usize]];
             for (i, dim) in [6, 6, self.camera_free[view.camera as usize].count].into_iter().enumerate() {
                 view.start[i + 1] = view.start[i] + if view.block[i] == NONE { 0 } else { dim };
             }
@@ -390,9 +387,10 @@ impl Layout {
         });
         let views = &self.views;
         (self.block_views_start, self.block_views) = group(self.owners.len(), || {
-            views.iter().enumerate().flat_map(|(v, view)| {
-                (0..3).filter(|&k| view.block[k] != NONE).map(move |k| (view.block[k] as usize, (v as u32, k as u8)))
-            })
+            views
+                .iter()
+                .enumerate()
+                .flat_map(|(v, view)| (0..3).filter(|&k| view.block[k] != NONE).map(move |k| (view.block[k] as usize, (v as u32, k as u8))))
         });
     }
 }

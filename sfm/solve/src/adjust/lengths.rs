@@ -180,7 +180,8 @@ pub(super) fn prior_residuals(problem: &Problem, layout: &Layout) -> usize {
 
 /// Baselines and scale bars at `state`.
 pub(super) fn length_residuals(problem: &Problem, layout: &Layout, state: &State) -> (Vec<LengthResidual>, Vec<LengthResidual>) {
-    let residual = |found: f64, given: f64, sigma: f64| LengthResidual { given, found, sigma, normalised_residual: (found - given) / sigma };
+    let residual =
+        |found: f64, given: f64, sigma: f64| LengthResidual { given, found, sigma, normalised_residual: (found - given) / sigma };
     let baselines = problem.baselines.iter().map(|b| {
         let found = (centre_in_world(state, b.a) - centre_in_world(state, b.b)).norm();
         residual(found, b.length, b.sigma)

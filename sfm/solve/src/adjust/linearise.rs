@@ -137,7 +137,14 @@ impl Default for ObservationJacobian {
 }
 
 /// Linearises an observation; false when the point does not project.
-pub(super) fn linearise_observation(layout: &Layout, state: &State, loss: &Loss, x: &[f64; 3], o: &Obs, out: &mut ObservationJacobian) -> bool {
+pub(super) fn linearise_observation(
+    layout: &Layout,
+    state: &State,
+    loss: &Loss,
+    x: &[f64; 3],
+    o: &Obs,
+    out: &mut ObservationJacobian,
+) -> bool {
     let view = &layout.views[o.view as usize];
     let pose: &ViewPose = &state.views[o.view as usize];
     let y = pose.r_rig_from_world * Vector3::from(*x);

@@ -79,8 +79,14 @@ fn minimise(problem: &Problem, options: &AdjustOptions, layout: &Layout, state: 
     let mut linear = Linearised::new(layout);
     let mut kept = KeptNormal::new(problem, layout, state, loss);
     let cost = linear.update(layout, state, loss, parallel) + kept.update(problem, layout, state, loss);
-    let mut outcome =
-        Outcome { initial_cost: cost, final_cost: cost, iterations: 0, steps_taken: 0, termination: Termination::NothingToAdjust, gradient_max: 0.0 };
+    let mut outcome = Outcome {
+        initial_cost: cost,
+        final_cost: cost,
+        iterations: 0,
+        steps_taken: 0,
+        termination: Termination::NothingToAdjust,
+        gradient_max: 0.0,
+    };
     if layout.unknowns() == 0 && !layout.slots.iter().any(|s| s.free) {
         return Ok(outcome);
     }

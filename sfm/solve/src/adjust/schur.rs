@@ -89,7 +89,8 @@ impl Reduced {
             Sliced::new(&mut self.damping, &layout.offsets),
         );
         for_each_piece(0..layout.block_count(), data, parallel, &|a, (values, rhs, gradient, added)| {
-            let mut panel = Panel { values: values.into_inner(), rhs: rhs.into_inner(), gradient: gradient.into_inner(), added: added.into_inner() };
+            let mut panel =
+                Panel { values: values.into_inner(), rhs: rhs.into_inner(), gradient: gradient.into_inner(), added: added.into_inner() };
             panel.sum_kept(layout, pattern, linear, kept, a);
             panel.damp(pattern, a, radius);
             panel.eliminate_points(layout, pattern, linear, point_inverse, a);
@@ -195,11 +196,9 @@ fn subtract_product(dim: usize, panel: &mut [f64], stride: usize, w: &[f64], y: 
 
 #[inline(always)]
 fn subtract_fixed<const D: usize>(panel: &mut [f64], stride: usize, w: &[f64], y: &[[f64; 3]]) {
-    let (Ok(w0), Ok(w1), Ok(w2)) = (
-        <&[f64; D]>::try_from(&w[..D]),
-        <&[f64; D]>::try_from(&w[D..2 * D]),
-        <&[f64; D]>::try_from(&w[2 * D..3 * D]),
-    ) else {
+    let (Ok(w0), Ok(w1), Ok(w2)) =
+        (<&[f64; D]>::try_from(&w[..D]), <&[f64; D]>::try_from(&w[D..2 * D]), <&[f64; D]>::try_from(&w[2 * D..3 * D]))
+    else {
         unreachable!("slices of D elements")
     };
     for (j, y) in y.iter().enumerate() {
@@ -225,14 +224,7 @@ fn damped_inverse(h: &[f64; 6], radius: f64) -> [f64; 6] {
     let m10 = -l10 * m00 * m11;
     let m21 = -l21 * m11 * m22;
     let m20 = -(l20 * m00 + l21 * m10) * m22;
-    [
-        m00 * m00 + m10 * m10 + m20 * m20,
-        m11 * m10 + m21 * m20,
-        m11 * m11 + m21 * m21,
-        m22 * m20,
-        m22 * m21,
-        m22 * m22,
-    ]
+    [m00 * m00 + m10 * m10 + m20 * m20, m11 * m10 + m21 * m20, m11 * m11 + m21 * m21, m22 * m20, m22 * m21, m22 * m22]
 }
 
 /// The step of a point given W^T d: -C^-1 (h + W^T d).

@@ -17,7 +17,14 @@ pub fn parse(text: &str) -> Option<Problem> {
     for _ in 0..observations {
         let [image, point, x, y] = [next()?, next()?, next()?, next()?];
         let (frame, camera) = (image as u32, image as u32);
-        problem.observations.push(ImageObservation { frame, sensor: 0, camera, point: point as u32, pixel: Vector2::new(x, -y), sigma_px: 1.0 });
+        problem.observations.push(ImageObservation {
+            frame,
+            sensor: 0,
+            camera,
+            point: point as u32,
+            pixel: Vector2::new(x, -y),
+            sigma_px: 1.0,
+        });
     }
     let turn = UnitQuaternion::new_normalize(Quaternion::new(0.0, 1.0, 0.0, 0.0));
     for _ in 0..cameras {

@@ -9,7 +9,8 @@ use std::path::Path;
 use std::process::Command;
 
 fn unpack(path: &Path) -> Option<String> {
-    let unpackers = [("bunzip2", vec!["-c"]), ("python3", vec!["-c", "import bz2,sys;sys.stdout.write(bz2.open(sys.argv[1],'rt').read())"])];
+    let unpackers =
+        [("bunzip2", vec!["-c"]), ("python3", vec!["-c", "import bz2,sys;sys.stdout.write(bz2.open(sys.argv[1],'rt').read())"])];
     let run = |(program, arguments): &(&str, Vec<&str>)| Command::new(program).args(arguments).arg(path).output().ok();
     let output = unpackers.iter().filter_map(run).find(|o| o.status.success())?;
     String::from_utf8(output.stdout).ok()

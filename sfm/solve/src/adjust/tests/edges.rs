@@ -91,7 +91,10 @@ fn impossible_input_is_refused_by_name() {
     assert_eq!(refused(&|p| p.points[2].xyz.x = f64::INFINITY), "point 2: position is not finite");
     assert_eq!(refused(&|p| p.frames[1].pose.translation.x = f64::NAN), "frame 1: pose is not finite");
     assert_eq!(refused(&|p| p.cameras[0].camera.params_mut()[0] = f64::NAN), "camera 0: parameter is not finite");
-    assert_eq!(refused(&|p| p.cameras[0].priors[0] = Some(ParamPrior { value: 1.0, sigma: -1.0 })), "camera 0: sigma of a prior = -1 is not positive");
+    assert_eq!(
+        refused(&|p| p.cameras[0].priors[0] = Some(ParamPrior { value: 1.0, sigma: -1.0 })),
+        "camera 0: sigma of a prior = -1 is not positive"
+    );
     let baseline = Baseline { a: (0, 0), b: (1, 0), length: 1.0, sigma: 0.1 };
     assert_eq!(refused(&|p| p.baselines = vec![Baseline { length: -1.0, ..baseline }]), "baseline 0: length = -1 is not positive");
     assert_eq!(refused(&|p| p.baselines = vec![Baseline { b: (0, 0), ..baseline }]), "baseline 0: both ends are the same");

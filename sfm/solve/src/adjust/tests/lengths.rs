@@ -48,7 +48,8 @@ fn alone_a_prior_is_met() {
     for _ in 0..20 {
         let prior = Rigid3::new(random.rotation(3.0), random.vector(5.0));
         let start = Rigid3::new(random.rotation(1.0) * prior.rotation, random.vector(5.0));
-        let block = PoseBlock { pose: start, free: true, prior: Some(PosePrior { pose: prior, sigma_rotation_rad: 0.1, sigma_translation: 2.0 }) };
+        let block =
+            PoseBlock { pose: start, free: true, prior: Some(PosePrior { pose: prior, sigma_rotation_rad: 0.1, sigma_translation: 2.0 }) };
         let camera = Camera::from_focal(CameraModel::Pinhole, 100, 100, 80.0).expect("valid");
         let mut cameras = CameraBlock { free: [true; MAX_CAMERA_PARAMS], ..CameraBlock::fixed(camera) };
         cameras.priors[1] = Some(ParamPrior { value: 95.0, sigma: 3.0 });

@@ -107,7 +107,8 @@ fn everything(model: CameraModel, sensors: usize) -> Problem {
         ScaleBar { a: 7, b: 5, length: 0.7, sigma: 0.02 },
         ScaleBar { a: 13, b: 1, length: 0.5, sigma: 0.02 },
     ];
-    problem.baselines = vec![Baseline { a: (1, 0), b: (3, 0), length: 0.95, sigma: 0.01 }, Baseline { a: (0, 0), b: (2, 0), length: 0.8, sigma: 0.02 }];
+    problem.baselines =
+        vec![Baseline { a: (1, 0), b: (3, 0), length: 0.95, sigma: 0.01 }, Baseline { a: (0, 0), b: (2, 0), length: 0.8, sigma: 0.02 }];
     if sensors > 1 {
         problem.sensors[1].prior = prior(problem.sensors[1].pose);
         problem.baselines.push(Baseline { a: (2, 0), b: (2, 1), length: 0.31, sigma: 0.005 });

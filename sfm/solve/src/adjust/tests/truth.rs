@@ -5,7 +5,13 @@ use crate::adjust::*;
 use ::scene::CameraModel;
 
 fn tight() -> AdjustOptions {
-    AdjustOptions { function_tolerance: 1e-15, parameter_tolerance: 1e-14, gradient_tolerance: 1e-12, max_iterations: 100, ..AdjustOptions::default() }
+    AdjustOptions {
+        function_tolerance: 1e-15,
+        parameter_tolerance: 1e-14,
+        gradient_tolerance: 1e-12,
+        max_iterations: 100,
+        ..AdjustOptions::default()
+    }
 }
 
 #[test]
@@ -54,13 +60,19 @@ fn noise_is_explained_as_the_degrees_of_freedom_say() {
     let freedom = (summary.residuals - summary.free.total + 7) as f64;
     let chi_square = 2.0 * summary.final_cost / 0.25;
     assert!((chi_square - freedom).abs() < 4.0 * (2.0 * freedom).sqrt(), "{chi_square} {freedom}");
-    assert!((summary.reprojection.rms_px.powi(2) * summary.observations as f64 - 2.0 * summary.final_cost).abs() < 1e-9 * summary.final_cost);
+    assert!(
+        (summary.reprojection.rms_px.powi(2) * summary.observations as f64 - 2.0 * summary.final_cost).abs() < 1e-9 * summary.final_cost
+    );
 }
 
 /// Largest change of a parameter, relative to its size.
 fn largest_change(a: &Problem, b: &Problem) -> f64 {
     let values = |p: &Problem| {
-        let poses = p.frames.iter().chain(&p.sensors).flat_map(|f| f.pose.rotation.coords.iter().chain(f.pose.translation.iter()).copied().collect::<Vec<_>>());
+        let poses = p
+            .frames
+            .iter()
+            .chain(&p.sensors)
+            .flat_map(|f| f.pose.rotation.coords.iter().chain(f.pose.translation.iter()).copied().collect::<Vec<_>>());
         let points = p.points.iter().flat_map(|x| x.xyz.iter().copied().collect::<Vec<_>>());
         let cameras = p.cameras.iter().flat_map(|c| c.camera.params().to_vec());
         poses.chain(points).chain(cameras).collect::<Vec<_>>()
@@ -105,7 +117,15 @@ fn sparse_and_dense_systems_lead_to_one_minimum() {
 #[test]
 fn bits_do_not_depend_on_threads() {
     for track in [4, 60] {
-        let mut start = truth(&Options { sensors: 2, frames: 60, points: if track == 4 { 900 } else { 60 }, track, arc: 0.02, noise_px: 0.5, ..Options::default() });
+        let mut start = truth(&Options {
+            sensors: 2,
+            frames: 60,
+            points: if track == 4 { 900 } else { 60 },
+            track,
+            arc: 0.02,
+            noise_px: 0.5,
+            ..Options::default()
+        });
         start.cameras.iter_mut().for_each(free_camera);
         perturb(&mut start, 0.005, 9);
         assert!(start.observations.len() > 4000);
