@@ -7,5 +7,8 @@ pub mod images;
 pub mod ingest;
 pub mod interior;
 pub mod mask;
+pub mod matching;
 pub mod model;
+pub mod orient;
 mod pairing;
+pub mod report;

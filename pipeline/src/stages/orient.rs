@@ -1,0 +1,206 @@
+//! Where every camera stood, and where the points are.
+
+use super::images::ImageList;
+use super::interior::{self, Start};
+use super::{features, matching, model};
+use crate::config::{Config, RigMode, ScaleBarConfig};
+use crate::error::NoResult;
+use crate::formats::StoredFeatures;
+use crate::stage::{Outcome, Stage, Work, no_inputs};
+use crate::store::Warning;
+use anyhow::{Context, Result};
+use mapping::{
+    BaselineInput, CameraInput, ImageInput, ImagePick, MapError, MapInput, OrientOptions, Orientation, RigInput, RigPoseInput,
+    ScaleBarInput,
+};
+use rayon::prelude::*;
+use scene::{CameraId, ImageId, Reconstruction, Scale};
+use serde_json::{Value, json};
+
+/// The stage.
+pub const STAGE: Stage =
+    Stage { name: "orient", version: 1, upstream: &["ingest", "features", "matching"], options, inputs: no_inputs, work };
+
+fn options(config: &Config) -> Value {
+    let poses: Vec<Value> = config
+        .rig
+        .poses
+        .iter()
+        .map(|pose| match pose {
+            None => Value::Null,
+            Some(pose) => {
+                let q = pose.cam_from_rig.rotation.quaternion();
+                json!({
+                    "quaternion_wxyz": [q.w, q.i, q.j, q.k],
+                    "translation_m": pose.cam_from_rig.translation.as_slice(),
+                    "sigma": pose.sigma.map(|(radians, metres)| [radians, metres]),
+                })
+            }
+        })
+        .collect();
+    json!({
+        "orient": config.orient,
+        "interior": interior::options(config),
+        "rig": {"mode": config.rig.mode, "poses": poses, "baselines": config.rig.baselines},
+        "scale_bars": config.scale_bars,
+    })
+}
+
+fn work(work: &Work<'_>) -> Result<Outcome> {
+    let list = ImageList::load(work)?;
+    let (starts, _) = interior::starts(work.config, &list)?;
+    let mut warnings = Vec::new();
+    let input = input(work, &list, &starts, &mut warnings)?;
+    work.progress.begin("orienting", 0);
+    let orientation = match mapping::orient(&input, &options_of(work.config)) {
+        Ok(orientation) => orientation,
+        Err(error @ MapError::NoInitialPair { .. }) => return Err(NoResult(error.to_string()).into()),
+        Err(error) => return Err(error.into()),
+    };
+    let largest = orientation.models.first().context("the orientation has no model")?;
+    model::save(work, largest, "sparse")?;
+    for (i, model) in orientation.models.iter().enumerate().skip(1) {
+        model::save(work, model, &format!("sparse/{i}"))?;
+    }
+    warnings.extend(orientation.summary.notes.iter().map(|note| Warning { about: "orientation".to_owned(), message: note.clone() }));
+    // Why an image has no keypoints has been told by the stage that found none.
+    for out in orientation.summary.left_out.iter().filter(|out| !input.keypoints[out.image.index()].is_empty()) {
+        let message = format!("not oriented: {}", out.reason);
+        warnings.push(Warning { about: list.images[out.image.index()].name.clone(), message });
+    }
+    for (i, model) in orientation.models.iter().enumerate().skip(1) {
+        let count = model.oriented_images().count();
+        let message = format!("{count} images form a model of their own, which could not be joined to the first: sparse/{i}");
+        warnings.push(Warning { about: "orientation".to_owned(), message });
+    }
+    Ok(Outcome { figures: figures(work.config, &list, &starts, &orientation, largest), warnings })
+}
+
+fn options_of(config: &Config) -> OrientOptions {
+    let o = &config.orient;
+    OrientOptions {
+        initial_min_inliers: o.initial_min_inliers as usize,
+        initial_min_angle_deg: o.initial_min_angle_deg,
+        register_max_error_px: o.register_max_error_px,
+        register_min_inliers: o.register_min_inliers as usize,
+        max_error_px: o.max_error_px,
+        min_angle_deg: o.min_angle_deg,
+        refine_principal_point: o.refine_principal_point,
+        seed: u64::from(o.seed),
+        ..OrientOptions::default()
+    }
+}
+
+fn input(work: &Work<'_>, list: &ImageList, starts: &[Start], warnings: &mut Vec<Warning>) -> Result<MapInput> {
+    // Descriptors are dropped image by image: all of them would not fit.
+    let positions: Vec<Result<Positions>> =
+        list.images.par_iter().map(|image| Ok(positions(&features::load(work, list, image)?))).collect();
+    let mut input = MapInput {
+        cameras: starts.iter().map(|s| CameraInput { camera: s.camera, known: s.is_known(), fixed: s.fixed }).collect(),
+        pairs: matching::load(work, list)?,
+        rig: rig(work.config),
+        ..MapInput::default()
+    };
+    for (image, positions) in list.images.iter().zip(positions) {
+        let (keypoints, colours) = positions?;
+        input.images.push(ImageInput { name: image.name.clone(), camera: CameraId::new(image.camera), exposure: image.exposure });
+        input.keypoints.push(keypoints);
+        input.colours.push(colours);
+    }
+    input.scale_bars = work.config.scale_bars.iter().map(|bar| scale_bar(bar, list, warnings)).collect();
+    Ok(input)
+}
+
+/// Keypoints and colours of an image.
+type Positions = (Vec<[f32; 2]>, Vec<[u8; 3]>);
+
+fn positions(stored: &StoredFeatures) -> Positions {
+    (stored.features.keypoints.iter().map(|k| [k.x, k.y]).collect(), stored.colours.clone())
+}
+
+fn rig(config: &Config) -> RigInput {
+    let camera = CameraId::new;
+    RigInput {
+        mode: match config.rig.mode {
+            RigMode::Rigid => mapping::RigMode::Rigid,
+            RigMode::Baselines => mapping::RigMode::Baselines,
+            RigMode::None => mapping::RigMode::None,
+        },
+        poses: config.rig.poses.iter().map(|p| p.map(|p| RigPoseInput { cam_from_rig: p.cam_from_rig, sigma: p.sigma })).collect(),
+        baselines: config
+            .rig
+            .baselines
+            .iter()
+            .map(|b| BaselineInput { cameras: (camera(b.cameras.0), camera(b.cameras.1)), length_m: b.length_m, sigma_m: b.sigma_m })
+            .collect(),
+    }
+}
+
+/// A pick in an image that could not be used is a warning.
+fn scale_bar(bar: &ScaleBarConfig, list: &ImageList, warnings: &mut Vec<Warning>) -> ScaleBarInput {
+    let ends = bar.ends.each_ref().map(|picks| {
+        let mut found = Vec::with_capacity(picks.len());
+        for pick in picks {
+            match list.images.iter().position(|i| i.name == pick.image) {
+                Some(i) => found.push(ImagePick { image: ImageId::new(i), pixel: [pick.x, pick.y] }),
+                None => warnings.push(Warning { about: bar.name.clone(), message: format!("there is no usable image {}", pick.image) }),
+            }
+        }
+        found
+    });
+    ScaleBarInput { ends, length_m: bar.length_m, sigma_m: bar.sigma_m, check: bar.check }
+}
+
+fn figures(config: &Config, list: &ImageList, starts: &[Start], orientation: &Orientation, model: &Reconstruction) -> Value {
+    let summary = &orientation.summary;
+    let oriented = model.oriented_images().count();
+    let scale = match model.scale {
+        Scale::Metric => "metric",
+        Scale::Arbitrary => "arbitrary",
+    };
+    let cameras: Vec<Value> = model
+        .cameras
+        .iter()
+        .zip(starts)
+        .zip(&list.cameras)
+        .map(|((camera, start), entry)| {
+            let params: serde_json::Map<String, Value> =
+                camera.model().param_names().iter().zip(camera.params()).map(|(name, value)| ((*name).to_owned(), json!(value))).collect();
+            json!({"name": entry.name, "model": camera.model().name(), "start": start.origin, "params": params})
+        })
+        .collect();
+    let name = |camera: CameraId| list.cameras[camera.index()].name.clone();
+    let baselines: Vec<Value> = summary
+        .baselines
+        .iter()
+        .map(|b| {
+            json!({
+                "between": [name(b.cameras.0), name(b.cameras.1)], "given_m": b.given_m, "found_m": b.found_m, "sigma_m": b.sigma_m,
+                "normalised_residual": b.normalised_residual,
+            })
+        })
+        .collect();
+    let scale_bars: Vec<Value> = summary
+        .scale_bars
+        .iter()
+        .map(|b| {
+            json!({
+                "name": config.scale_bars[b.index].name, "given_m": b.given_m, "found_m": b.found_m,
+                "error_m": b.found_m.map(|found| found - b.given_m), "check": b.check,
+            })
+        })
+        .collect();
+    let models: Vec<Value> =
+        orientation.models.iter().map(|m| json!({"images": m.oriented_images().count(), "points": m.points.len()})).collect();
+    let rms = model.reprojection_rms();
+    let note = format!("{oriented} of {} images, {} points, {rms:.2} px, {scale}", list.images.len(), model.points.len());
+    json!({
+        "oriented": oriented, "points": model.points.len(), "observations": model.observation_count(), "reprojection_rms_px": rms,
+        "reprojection_mean_px": model.mean_point_error(), "scale": scale, "cameras": cameras, "baselines": baselines,
+        "scale_bars": scale_bars, "models": models, "note": note,
+        "adjustment": {
+            "initial_cost": summary.adjustment.initial_cost, "final_cost": summary.adjustment.final_cost,
+            "iterations": summary.adjustment.iterations, "termination": format!("{:?}", summary.adjustment.termination).to_lowercase(),
+        },
+    })
+}

@@ -1,0 +1,67 @@
+//! The whole way on a rendered dive, against its truth.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+mod support;
+
+use serde_json::Value;
+use std::fmt::Write;
+use support::Dive;
+use synthetic::dive::DiveOptions;
+
+/// A baseline makes the model metric; poses, lengths and cloud agree with the truth; every figure is explained.
+#[test]
+fn a_rendered_dive_comes_out_as_it_is() {
+    let (dive, rendered) = Dive::rendered(&DiveOptions { exposures: 6, width: 480, height: 300, ..DiveOptions::default() });
+    let truth = rendered.truth("png");
+    let mut positions = String::new();
+    for (i, image) in truth.images.iter().enumerate() {
+        let centre = truth.cam_from_world(scene::ImageId::new(i)).unwrap().centre();
+        writeln!(positions, "{} {} {} {}", image.name, centre.x, centre.y, centre.z).unwrap();
+    }
+    dive.write("positions.txt", &positions);
+    let baseline = rendered.cam_from_rig[1].centre().norm();
+    dive.write(
+        "dive.toml",
+        &format!(
+            "[[camera]]\nimages = \"frames/C1\"\n[[camera]]\nimages = \"frames/C2\"\n\
+             [[rig.baseline]]\nbetween = [\"C1\", \"C2\"]\nlength_m = {baseline}\nsigma_m = 0.0005\n\
+             [densify]\nquality = \"low\"\nmax_views = 3\nmin_views = 2\n\
+             [evaluate]\nreference = \"reference.ply\"\npositions = \"positions.txt\"\nthreshold_m = 0.05\n"
+        ),
+    );
+    let printed: Value = serde_json::from_str(&dive.ok(&["run", "--json"])).unwrap();
+    assert_eq!(printed["images"]["oriented"], 12, "{printed:#}");
+    assert_eq!(printed["scale"], "metric");
+    let number = |path: &str| printed.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("no {path} in {printed:#}"));
+    // The focal lengths start from a guess that is half as long again as the true ones.
+    assert!(number("/reprojection_rms_px") < 1.0);
+    assert!((number("/baselines/0/found_m") - baseline).abs() < 0.002 * baseline);
+    assert!(number("/evaluation/positions/rmse_m") < 0.01 * number("/evaluation/positions/path_m"));
+    assert!((number("/evaluation/positions/scale") - 1.0).abs() < 0.02);
+    assert!(number("/evaluation/c2m_median_m") < 0.03);
+    assert!(number("/dense/points") > 1000.0);
+    for stage in ["ingest", "mask", "features", "matching", "orient", "densify", "evaluate", "report"] {
+        assert!(number(&format!("/stages/{stage}/seconds")) >= 0.0);
+    }
+
+    // report.json is what was printed, without the times.
+    let mut without_times = printed.clone();
+    without_times.as_object_mut().unwrap().remove("stages");
+    let written: Value = serde_json::from_slice(&std::fs::read(dive.path("out/report.json")).unwrap()).unwrap();
+    assert_eq!(written, without_times);
+    let help = dive.ok(&["help", "json"]);
+    let known: Vec<&str> = help.lines().filter_map(|l| l.split_whitespace().next()).collect();
+    for key in support::keys(&printed) {
+        assert!(known.contains(&key.as_str()), "{key} is not explained");
+    }
+
+    // Nothing is left to do; a changed option of one stage leaves those before it done.
+    let stages =
+        |text: String| -> Vec<String> { text.lines().map(|l| l.split_whitespace().take(2).collect::<Vec<_>>().join(" ")).collect() };
+    assert!(stages(dive.ok(&["status"])).iter().all(|l| l.ends_with(" done")));
+    let text = std::fs::read_to_string(dive.path("dive.toml")).unwrap();
+    dive.write("dive.toml", &text.replace("quality = \"low\"", "quality = \"medium\""));
+    let changed = stages(dive.ok(&["status"]));
+    assert_eq!(&changed[4..], ["orient done", "densify stale", "evaluate stale", "report stale"]);
+}
