@@ -67,49 +67,63 @@ fn flag(value: &Option<Spanned<bool>>, default: bool) -> bool {
 }
 
 pub(super) fn features(source: &mut Source<'_>, raw: &RawFeatures) -> FeaturesConfig {
-    let mut values = Values { source };
+    let (mut values, default) = (Values { source }, ::features::SiftOptions::default());
+    let contrast = f64::from(default.contrast_threshold);
     FeaturesConfig {
-        max_keypoints: values.count("features.max_keypoints", &raw.max_keypoints, 100, 100_000, 8192),
-        double_image: flag(&raw.double_image, false),
-        contrast_threshold: values.within("features.contrast_threshold", &raw.contrast_threshold, 0.0, 1.0, 0.02 / 3.0),
+        max_keypoints: values.count("features.max_keypoints", &raw.max_keypoints, 100, 100_000, default.max_features as u32),
+        double_image: flag(&raw.double_image, default.double_image),
+        contrast_threshold: values.within("features.contrast_threshold", &raw.contrast_threshold, 1e-6, 1.0, contrast),
     }
 }
 
 pub(super) fn matching(source: &mut Source<'_>, raw: &RawMatching) -> MatchingConfig {
     let mut values = Values { source };
+    let (matches, verify) = (::features::MatchOptions::default(), ::features::VerifyOptions::default());
+    let ratio = (f64::from(matches.max_ratio) * 1e6).round() / 1e6;
     let rules = [("auto", PairRule::Auto), ("exhaustive", PairRule::Exhaustive), ("sequential", PairRule::Sequential)];
     MatchingConfig {
         pairs: values.choice("matching.pairs", &raw.pairs, &rules).unwrap_or(PairRule::Auto),
         exhaustive_up_to: values.count("matching.exhaustive_up_to", &raw.exhaustive_up_to, 0, 100_000, 200),
         overlap: values.count("matching.overlap", &raw.overlap, 1, 10_000, 10),
-        ratio: values.within("matching.ratio", &raw.ratio, 0.1, 1.0, 0.8),
-        max_error_px: values.within("matching.max_error_px", &raw.max_error_px, 0.1, 100.0, 4.0),
-        min_inliers: values.count("matching.min_inliers", &raw.min_inliers, 8, 10_000, 15),
+        ratio: values.within("matching.ratio", &raw.ratio, 0.1, 1.0, ratio),
+        max_error_px: values.within("matching.max_error_px", &raw.max_error_px, 0.1, 100.0, verify.max_error_px),
+        min_inliers: values.count("matching.min_inliers", &raw.min_inliers, 8, 10_000, verify.min_inliers as u32),
     }
 }
 
 pub(super) fn orient(source: &mut Source<'_>, raw: &RawOrient) -> OrientConfig {
-    let mut values = Values { source };
+    let (mut values, default) = (Values { source }, mapping::OrientOptions::default());
+    let mut count = |key: &str, value, low, default: usize| values.count(key, value, low, 100_000, default as u32);
+    let initial_min_inliers = count("orient.initial_min_inliers", &raw.initial_min_inliers, 10, default.initial_min_inliers);
+    let register_min_inliers = count("orient.register_min_inliers", &raw.register_min_inliers, 6, default.register_min_inliers);
+    let mut within = |key: &str, value, low, high, default| values.within(key, value, low, high, default);
     OrientConfig {
-        initial_min_inliers: values.count("orient.initial_min_inliers", &raw.initial_min_inliers, 10, 100_000, 100),
-        initial_min_angle_deg: values.within("orient.initial_min_angle_deg", &raw.initial_min_angle_deg, 0.1, 90.0, 16.0),
-        register_max_error_px: values.within("orient.register_max_error_px", &raw.register_max_error_px, 0.1, 200.0, 12.0),
-        register_min_inliers: values.count("orient.register_min_inliers", &raw.register_min_inliers, 6, 100_000, 30),
-        max_error_px: values.within("orient.max_error_px", &raw.max_error_px, 0.1, 100.0, 4.0),
-        min_angle_deg: values.within("orient.min_angle_deg", &raw.min_angle_deg, 0.0, 45.0, 1.5),
-        refine_principal_point: flag(&raw.refine_principal_point, false),
-        seed: values.count("orient.seed", &raw.seed, 0, u32::MAX, 0),
+        initial_min_inliers,
+        initial_min_angle_deg: within("orient.initial_min_angle_deg", &raw.initial_min_angle_deg, 0.1, 90.0, default.initial_min_angle_deg),
+        register_max_error_px: within(
+            "orient.register_max_error_px",
+            &raw.register_max_error_px,
+            0.1,
+            200.0,
+            default.register_max_error_px,
+        ),
+        register_min_inliers,
+        max_error_px: within("orient.max_error_px", &raw.max_error_px, 0.1, 100.0, default.max_error_px),
+        min_angle_deg: within("orient.min_angle_deg", &raw.min_angle_deg, 0.0, 45.0, default.min_angle_deg),
+        refine_principal_point: flag(&raw.refine_principal_point, default.refine_principal_point),
+        seed: values.count("orient.seed", &raw.seed, 0, u32::MAX, default.seed as u32),
     }
 }
 
 pub(super) fn densify(source: &mut Source<'_>, raw: &RawDensify) -> DensifyConfig {
     let mut values = Values { source };
+    let (views, fusion) = (dense::ViewSelectionOptions::default(), dense::FusionOptions::default());
     let qualities = [("low", DenseQuality::Low), ("medium", DenseQuality::Medium), ("high", DenseQuality::High)];
     DensifyConfig {
         quality: values.choice("densify.quality", &raw.quality, &qualities).unwrap_or(DenseQuality::Medium),
-        max_views: values.count("densify.max_views", &raw.max_views, 1, 100, 8),
-        min_views: values.count("densify.min_views", &raw.min_views, 2, 100, 3),
-        seed: values.count("densify.seed", &raw.seed, 0, u32::MAX, 0),
+        max_views: values.count("densify.max_views", &raw.max_views, 1, 16, views.max_views as u32),
+        min_views: values.count("densify.min_views", &raw.min_views, 2, 16, fusion.min_views as u32),
+        seed: values.count("densify.seed", &raw.seed, 0, u32::MAX, dense::DepthOptions::default().seed as u32),
     }
 }
 
