@@ -56,6 +56,12 @@ fn a_rendered_dive_comes_out_as_it_is() {
         assert!(known.contains(&key.as_str()), "{key} is not explained");
     }
 
+    // The page shows the scene and the images, and needs nothing from elsewhere.
+    let page = std::fs::read_to_string(dive.path("out/report.html")).unwrap();
+    assert!(page.contains("12 of 12 images oriented, in metres") && page.contains("C2/0005.png"));
+    assert_eq!(page.matches("data:image/jpeg;base64,").count(), 12);
+    assert!(!page.contains("http://") && !page.contains("https://"));
+
     // Nothing is left to do; a changed option of one stage leaves those before it done.
     let stages =
         |text: String| -> Vec<String> { text.lines().map(|l| l.split_whitespace().take(2).collect::<Vec<_>>().join(" ")).collect() };

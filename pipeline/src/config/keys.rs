@@ -99,6 +99,8 @@ pub const KEYS: &[(&str, &str)] = &[
     ("evaluate.threshold_m", "a number above 0, metres"),
     ("evaluate.density_radius_m", "a number above 0, metres"),
     ("evaluate.grid_m", "a number above 0, metres"),
+    ("report.thumbnails", "a whole number of images"),
+    ("report.thumbnail_px", "a whole number, pixels"),
 ];
 
 /// What a key takes, in words.

@@ -1,6 +1,6 @@
 //! The configuration as resolved: every default filled in, every value checked.
 
-use super::stage_options::{DensifyConfig, EvaluateConfig, FeaturesConfig, MaskConfig, MatchingConfig, OrientConfig};
+use super::stage_options::{DensifyConfig, EvaluateConfig, FeaturesConfig, MaskConfig, MatchingConfig, OrientConfig, ReportConfig};
 use scene::{CameraModel, Rigid3};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -34,6 +34,8 @@ pub struct Config {
     pub densify: DensifyConfig,
     /// Options of the stage `evaluate`.
     pub evaluate: EvaluateConfig,
+    /// Options of the stage `report`.
+    pub report: ReportConfig,
 }
 
 /// How exposures of several cameras pair up into frames.

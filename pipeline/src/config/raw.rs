@@ -182,4 +182,7 @@ pub(super) struct RawEvaluate {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub(super) struct RawReport {}
+pub(super) struct RawReport {
+    pub(super) thumbnails: Place<u32>,
+    pub(super) thumbnail_px: Place<u32>,
+}

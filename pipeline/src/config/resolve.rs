@@ -106,6 +106,7 @@ fn resolve(source: &mut Source<'_>, raw: &RawConfig, file: &Path) -> Config {
         orient: stages::orient(source, &raw.orient),
         densify: stages::densify(source, &raw.densify),
         evaluate: stages::evaluate(source, &raw.evaluate, folder),
+        report: stages::report(source, &raw.report),
         cameras,
     }
 }

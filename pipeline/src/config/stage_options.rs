@@ -177,3 +177,12 @@ pub struct EvaluateConfig {
     /// Cell of the integrity, metres; `None`: the threshold.
     pub grid_m: Option<f64>,
 }
+
+/// Options of the stage `report`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReportConfig {
+    /// Most images that are shown.
+    pub thumbnails: u32,
+    /// Their long side, pixels.
+    pub thumbnail_px: u32,
+}

@@ -2,10 +2,10 @@
 
 use super::error::Source;
 use super::model::CameraConfig;
-use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient};
+use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport};
 use super::stage_options::{
     DenseQuality, DensifyConfig, EvaluateConfig, FeaturesConfig, IpConfig, MaskConfig, MaskStrategy, MatchingConfig, OrientConfig,
-    PairRule, Polarity,
+    PairRule, Polarity, ReportConfig,
 };
 use super::values::Values;
 use std::path::Path;
@@ -145,5 +145,13 @@ pub(super) fn evaluate(source: &mut Source<'_>, raw: &RawEvaluate, folder: &Path
         threshold_m: values.positive("evaluate.threshold_m", &raw.threshold_m),
         density_radius_m: values.positive("evaluate.density_radius_m", &raw.density_radius_m),
         grid_m: values.positive("evaluate.grid_m", &raw.grid_m),
+    }
+}
+
+pub(super) fn report(source: &mut Source<'_>, raw: &RawReport) -> ReportConfig {
+    let mut values = Values { source };
+    ReportConfig {
+        thumbnails: values.count("report.thumbnails", &raw.thumbnails, 0, 1000, 24),
+        thumbnail_px: values.count("report.thumbnail_px", &raw.thumbnail_px, 32, 4096, 480),
     }
 }

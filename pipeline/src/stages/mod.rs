@@ -10,5 +10,6 @@ pub mod mask;
 pub mod matching;
 pub mod model;
 pub mod orient;
+mod page;
 mod pairing;
 pub mod report;

@@ -1,7 +1,9 @@
 //! Every figure of every stage, in one file for programs and one page for people.
 
+use super::page::page;
 use crate::config::Config;
 use crate::figures;
+use crate::report::render;
 use crate::stage::{Outcome, Stage, Work, no_inputs};
 use crate::store::Fingerprint;
 use anyhow::Result;
@@ -18,12 +20,15 @@ pub const STAGE: Stage = Stage {
 };
 
 fn options(config: &Config) -> Value {
-    json!({"name": config.name})
+    json!({"name": config.name, "report": config.report})
 }
 
 fn work(work: &Work<'_>) -> Result<Outcome> {
     let report = figures::report(work.config, work.done);
-    let text = format!("{report:#}\n");
-    work.files.save("report.json", Fingerprint::of_bytes(text.as_bytes()), text.as_bytes())?;
-    Ok(Outcome { figures: json!({"note": "report.json"}), warnings: Vec::new() })
+    let json = format!("{report:#}\n");
+    let html = render(&page(work, &report)?);
+    for (path, text) in [("report.json", &json), ("report.html", &html)] {
+        work.files.save(path, Fingerprint::of_bytes(text.as_bytes()), text.as_bytes())?;
+    }
+    Ok(Outcome { figures: json!({"note": "report.json, report.html"}), warnings: Vec::new() })
 }
