@@ -14,7 +14,7 @@ const CELLS: usize = 4;
 /// Directions of a cell.
 const DIRECTIONS: usize = 8;
 /// Side of a cell in standard deviations of the keypoint.
-const CELL_SIGMAS: f32 = 3.0;
+const CELL_SIGMAS: f32 = 3.5;
 /// Gradients on a side of the grid, which covers half a cell more than the cells on each side.
 const GRID: usize = 24;
 /// Samples on a side: gradients are differences of neighbours.
