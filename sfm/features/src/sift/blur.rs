@@ -46,10 +46,11 @@ fn lanes(row: &[f32], x: usize) -> &[f32; LANES] {
 }
 
 #[inline(always)]
-fn multiply_add(sum: &mut [f32; LANES], weight: f32, values: &[f32; LANES]) {
+fn multiply_add(mut sum: [f32; LANES], weight: f32, values: &[f32; LANES]) -> [f32; LANES] {
     for l in 0..LANES {
         sum[l] += weight * values[l];
     }
+    sum
 }
 
 /// `out[j * stride + x]` for j below R = sum over i of `weights[i] * rows[i + j][x]`.
@@ -60,22 +61,28 @@ fn columns<const R: usize>(rows: &[&[f32]], weights: &[f32], out: &mut [f32], st
     let mut x = 0;
     while x + LANES <= width {
         let mut sums = [[0f32; LANES]; R];
+        // The bounds of the inner loops are constants: only so are the sums kept in registers.
         for i in 0..R - 1 {
             let values = lanes(rows[i], x);
-            for j in 0..=i {
-                multiply_add(&mut sums[j], weights[i - j], values);
+            for j in 0..R {
+                if j <= i {
+                    sums[j] = multiply_add(sums[j], weights[i - j], values);
+                }
             }
         }
         for i in R - 1..taps {
             let values = lanes(rows[i], x);
+            let window: &[f32; R] = weights[i + 1 - R..=i].try_into().expect("the slice has that length");
             for j in 0..R {
-                multiply_add(&mut sums[j], weights[i - j], values);
+                sums[j] = multiply_add(sums[j], window[R - 1 - j], values);
             }
         }
         for i in 0..R - 1 {
             let values = lanes(rows[taps + i], x);
-            for j in i + 1..R {
-                multiply_add(&mut sums[j], weights[taps + i - j], values);
+            for j in 0..R {
+                if j > i {
+                    sums[j] = multiply_add(sums[j], weights[taps + i - j], values);
+                }
             }
         }
         for j in 0..R {

@@ -9,10 +9,12 @@ use super::select::select;
 use super::simd::Simd;
 use crate::FeatureError;
 use rayon::prelude::*;
-use scene::{Descriptor, Features, Keypoint, Mask, Raster};
+use scene::{Features, Keypoint, Mask, Raster};
 
-/// Keypoints that one task describes.
+/// Keypoints that one task describes at least.
 const TASK: usize = 64;
+/// Rows of a strip that keypoints are described along: its pixels fit into a core's cache.
+const PLACE_ROWS: u32 = 32;
 
 /// Finds SIFT keypoints in a grey image (0..=1) and describes them as RootSIFT; the best come first.
 ///
@@ -37,47 +39,59 @@ pub(super) fn extract_with(simd: Simd, grey: &Raster<f32>, mask: Option<&Mask>, 
     let pixels: Vec<f32> = pyramid.octaves.iter().map(|o| o.pixel).collect();
     let kept = select(&pyramid.candidates, &pixels, (width, height), options);
 
-    let oriented: Vec<Vec<(usize, f32)>> = kept
-        .par_chunks(TASK)
-        .map(|task| {
-            let directions = |&i: &usize| {
-                let candidate = &pyramid.candidates[i];
-                let [x, y] = candidate.position;
-                let found = orientations(simd, pyramid.view(candidate), x, y, candidate.sigma, options.max_orientations);
-                found.into_iter().map(move |angle| (i, angle))
-            };
-            task.iter().flat_map(directions).collect()
-        })
-        .collect();
-    let mut oriented = oriented.concat();
+    let directions = pyramid.for_each(&kept, |_, candidate, view| {
+        let [x, y] = candidate.position;
+        orientations(simd, view, x, y, candidate.sigma, options.max_orientations)
+    });
+    let mut oriented: Vec<(usize, f32)> = Vec::with_capacity(options.max_features.min(2 * kept.len()));
+    for (&i, directions) in kept.iter().zip(&directions) {
+        oriented.extend(directions.iter().map(|&angle| (i, angle)));
+    }
     oriented.truncate(options.max_features);
 
-    let descriptors: Vec<Vec<Descriptor>> = oriented
-        .par_chunks(TASK)
-        .map(|task| {
-            let one = |&(i, angle): &(usize, f32)| {
-                let candidate = &pyramid.candidates[i];
-                let [x, y] = candidate.position;
-                describe(simd, pyramid.view(candidate), x, y, candidate.sigma, angle)
-            };
-            task.iter().map(one).collect()
-        })
-        .collect();
+    let described: Vec<usize> = oriented.iter().map(|&(i, _)| i).collect();
+    let descriptors = pyramid.for_each(&described, |n, candidate, view| {
+        let [x, y] = candidate.position;
+        describe(simd, view, x, y, candidate.sigma, oriented[n].1)
+    });
     let keypoint = |&(i, angle): &(usize, f32)| {
         let candidate = &pyramid.candidates[i];
         let pixel = pixels[candidate.octave];
         let [x, y] = candidate.position.map(|v| v * pixel + 0.5);
         Keypoint { x, y, scale: candidate.sigma * pixel, orientation: angle }
     };
-    Ok(Features { keypoints: oriented.iter().map(keypoint).collect(), descriptors: descriptors.concat() })
+    Ok(Features { keypoints: oriented.iter().map(keypoint).collect(), descriptors })
 }
 
 impl Pyramid {
+    /// What `work` makes of each of the `kept` candidates (its place in `kept`, itself and its level), in the order of `kept`.
+    ///
+    /// The work goes from place to place: neighbours find each other's pixels in the cache.
+    fn for_each<T: Send>(&self, kept: &[usize], work: impl Fn(usize, &Candidate, View) -> T + Sync) -> Vec<T> {
+        let place = |&n: &usize| {
+            let candidate = &self.candidates[kept[n]];
+            (candidate.octave, self.level(candidate), candidate.sample[1] / PLACE_ROWS, candidate.sample[0], n)
+        };
+        let mut order: Vec<usize> = (0..kept.len()).collect();
+        order.sort_by_cached_key(place);
+        let one = |&n: &usize| {
+            let candidate = &self.candidates[kept[n]];
+            (n, work(n, candidate, self.view(candidate)))
+        };
+        let mut done: Vec<(usize, T)> = order.par_iter().with_min_len(TASK).map(one).collect();
+        done.sort_unstable_by_key(|&(n, _)| n);
+        done.into_iter().map(|(_, result)| result).collect()
+    }
+
     /// The level whose blur is nearest to the keypoint's.
-    fn view(&self, candidate: &Candidate) -> View<'_> {
-        let octave = &self.octaves[candidate.octave];
+    fn level(&self, candidate: &Candidate) -> usize {
         let distance = |k: usize| (self.sigmas[k].ln() - f64::from(candidate.sigma).ln()).abs();
-        let level = (1..=octave.images.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(1);
+        let levels = self.octaves[candidate.octave].images.len();
+        (1..=levels).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(1)
+    }
+
+    fn view(&self, candidate: &Candidate) -> View<'_> {
+        let (octave, level) = (&self.octaves[candidate.octave], self.level(candidate));
         View { data: &octave.images[level - 1], width: octave.width, height: octave.height }
     }
 }

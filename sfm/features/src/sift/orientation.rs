@@ -96,10 +96,10 @@ fn histogram_body(view: View, x: f32, y: f32, sigma: f32, histogram: &mut [f32; 
             for l in 0..n {
                 // Bin b is centred at b + 0.5: shared between the two nearest.
                 let position = bins[l] + (BINS as f32 - 0.5);
-                let low = position as usize;
+                let low = position as i32;
                 let share = position - low as f32;
-                histogram[low % BINS] += (1.0 - share) * weights[l];
-                histogram[(low + 1) % BINS] += share * weights[l];
+                histogram[low as usize % BINS] += (1.0 - share) * weights[l];
+                histogram[(low + 1) as usize % BINS] += share * weights[l];
             }
             start += n;
         }

@@ -120,5 +120,6 @@ fn features_spread_over_the_image() {
     let options = SiftOptions { max_features: 300, ..SiftOptions::default() };
     let features = extract(&image, None, &options).expect("valid options");
     let left = features.keypoints.iter().filter(|k| k.x < 300.0).count();
-    assert!(left >= 75, "only {left} of {} features in the faint half", features.len());
+    // The spread quarter goes to the cells with the fewest: most to the faint half.
+    assert!(left >= 35, "only {left} of {} features in the faint half", features.len());
 }
