@@ -13,8 +13,12 @@ use scene::camera::MAX_CAMERA_PARAMS;
 
 /// No block: what it would describe is fixed.
 pub(super) const NONE: u32 = u32::MAX;
-/// Observations of a piece of parallel work. Pieces do not depend on the number of threads.
-const PIECE_OBSERVATIONS: usize = 1024;
+/// Observations of a piece of parallel work, at least. Pieces do not depend on the number of threads.
+const PIECE_OBSERVATIONS: usize = 2048;
+/// The largest number of pieces. Each has its own sums over views, which together shall not take more memory than
+/// [`VIEW_SUMS_PER_OBSERVATION`] values an observation.
+const MAX_PIECES: usize = 32;
+const VIEW_SUMS_PER_OBSERVATION: usize = 16;
 
 /// Whose parameters a kept block holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +72,8 @@ pub(super) struct Slot {
     pub first_obs: u32,
     pub first_incidence: u32,
     pub first_w: usize,
+    /// Number of its first product in the elimination: incidences i <= j in order, i outermost.
+    pub first_product: usize,
 }
 
 /// One kept block that a point meets.
@@ -95,8 +101,6 @@ impl FreeParams {
 #[derive(Debug, Default)]
 pub(super) struct Pieces {
     pub slots: Vec<usize>,
-    /// Observations times [`Layout::row_stride`].
-    pub rows: Vec<usize>,
     pub w: Vec<usize>,
     /// 0, 1, 2...: one entry a piece.
     pub ones: Vec<usize>,
@@ -118,20 +122,14 @@ pub(super) struct Layout {
     /// Observations of kept points, with their views.
     pub kept_observations: Vec<(u32, ImageObservation)>,
     pub views: Vec<View>,
-    /// The longest Jacobian row of a view.
-    pub row_len: usize,
     pub obs: Vec<Obs>,
     /// One more entry at the end, for the ends of the lists.
     pub slots: Vec<Slot>,
     pub incidences: Vec<Incidence>,
     /// Pieces of the work by point: where each begins, and the end of the last.
     pub pieces: Pieces,
-    /// Observations (positions in `obs`) of each view, and where each view's begin.
-    pub view_obs: Vec<u32>,
-    pub view_obs_start: Vec<usize>,
-    /// (slot, incidence) of each kept block, and where each block's begin.
-    pub block_points: Vec<(u32, u32)>,
-    pub block_points_start: Vec<usize>,
+    /// Number of products of the elimination that go to each block's panel.
+    pub block_products: Vec<usize>,
     /// (view, segment) of each kept block, and where each block's begin.
     pub block_views: Vec<(u32, u8)>,
     pub block_views_start: Vec<usize>,
@@ -173,9 +171,14 @@ impl Layout {
         self.pieces.slots.len() - 1
     }
 
-    /// Length of what [`super::linearise`] stores of an observation: two rows of the Jacobian and two residuals.
-    pub fn row_stride(&self) -> usize {
-        if self.row_len == 0 { 0 } else { 2 * self.row_len + 2 }
+    /// Where the normal equations of each view begin, d x d and d values, and their length.
+    pub fn view_start(&self) -> Vec<usize> {
+        let mut start = vec![0];
+        for view in &self.views {
+            let d = view.row_len();
+            start.push(start[start.len() - 1] + d * d + d);
+        }
+        start
     }
 
     /// Length of the W of all incidences.
@@ -287,7 +290,6 @@ impl Layout {
                 view.start[i + 1] = view.start[i] + if view.block[i] == NONE { 0 } else { dim };
             }
         }
-        self.row_len = self.views.iter().map(View::row_len).max().unwrap_or(0);
     }
 
     fn push_block(&mut self, owner: Owner, dim: usize) -> u32 {
@@ -310,10 +312,10 @@ impl Layout {
         let mut total = 0;
         for (p, count) in position.iter_mut().enumerate().filter(|(_, c)| **c != 0 && **c != KEPT) {
             let free = problem.points[p].free;
-            self.slots.push(Slot { point: p as u32, free, first_obs: total, first_incidence: 0, first_w: 0 });
+            self.slots.push(Slot { point: p as u32, free, first_obs: total, first_incidence: 0, first_w: 0, first_product: 0 });
             (total, *count) = (total + *count, total);
         }
-        self.slots.push(Slot { point: NONE, free: false, first_obs: total, first_incidence: 0, first_w: 0 });
+        self.slots.push(Slot { point: NONE, free: false, first_obs: total, first_incidence: 0, first_w: 0, first_product: 0 });
         let empty = Obs { view: 0, incidence: [NONE; 3], pixel: [0.0; 2], inverse_sigma: 0.0 };
         self.obs = vec![empty; total as usize];
         for ((o, &view), _) in problem.observations.iter().zip(view_of).zip(active).filter(|(_, a)| **a) {
@@ -331,16 +333,21 @@ impl Layout {
 
     fn find_incidences(&mut self) {
         let mut blocks: Vec<u32> = Vec::new();
-        let (mut w, mut piece_end) = (0, 0);
+        self.block_products = vec![0; self.owners.len()];
+        let view_sums = self.view_start()[self.views.len()].max(1);
+        let pieces = (self.obs.len() / PIECE_OBSERVATIONS).min(VIEW_SUMS_PER_OBSERVATION * self.obs.len() / view_sums).clamp(1, MAX_PIECES);
+        let piece_len = self.obs.len().div_ceil(pieces) as u32;
+        let (mut w, mut piece_end, mut products) = (0, 0, 0);
         for s in 0..self.slots.len() {
             self.slots[s].first_incidence = self.incidences.len() as u32;
             self.slots[s].first_w = w;
+            self.slots[s].first_product = products;
             if s + 1 == self.slots.len() {
                 break;
             }
             if self.slots[s].first_obs >= piece_end {
                 self.push_piece(s);
-                piece_end = self.slots[s].first_obs + PIECE_OBSERVATIONS as u32;
+                piece_end += piece_len;
             }
             let slot = &self.slots[s];
             if !slot.free {
@@ -359,8 +366,10 @@ impl Layout {
                     *incidence = blocks.binary_search(&block).map_or(NONE, |i| i as u32);
                 }
             }
-            for &block in &blocks {
+            for (i, &block) in blocks.iter().enumerate() {
                 self.incidences.push(Incidence { block, w });
+                self.block_products[block as usize] += blocks.len() - i;
+                products += blocks.len() - i;
                 w += 3 * (self.offsets[block as usize + 1] - self.offsets[block as usize]);
             }
         }
@@ -371,20 +380,10 @@ impl Layout {
         let first = &self.slots[slot];
         self.pieces.ones.push(self.pieces.slots.len());
         self.pieces.slots.push(slot);
-        self.pieces.rows.push(first.first_obs as usize * self.row_stride());
         self.pieces.w.push(first.first_w);
     }
 
     fn index_blocks(&mut self) {
-        (self.view_obs_start, self.view_obs) =
-            group(self.views.len(), || self.obs.iter().enumerate().map(|(i, o)| (o.view as usize, i as u32)));
-        let slots = &self.slots;
-        let incidences = &self.incidences;
-        (self.block_points_start, self.block_points) = group(self.owners.len(), || {
-            slots.windows(2).enumerate().flat_map(|(s, w)| {
-                (w[0].first_incidence..w[1].first_incidence).map(move |i| (incidences[i as usize].block as usize, (s as u32, i)))
-            })
-        });
         let views = &self.views;
         (self.block_views_start, self.block_views) = group(self.owners.len(), || {
             views

@@ -15,6 +15,7 @@
 //! term of Triggs et al., *Bundle adjustment: a modern synthesis*, 1999, would make the matrix indefinite for outliers
 //! under these losses; Ceres drops it there for that reason.
 
+use super::kernels;
 use super::layout::{Layout, NONE, Obs};
 use super::pieces::{Sliced, for_each_piece};
 use super::state::{State, ViewPose};
@@ -35,75 +36,59 @@ pub(super) struct PointNormal {
 /// Normal equations of the image observations at a state.
 #[derive(Debug, Default)]
 pub(super) struct Linearised {
-    /// Of each observation: two rows F, two residuals.
-    rows: Vec<f64>,
     pub points: Vec<PointNormal>,
     /// Of each incidence: W, three columns of the block's dimension.
     pub w: Vec<f64>,
-    /// Of each view with d parameters: F^T F (d x d by columns, lower triangle valid) and F^T r.
+    /// Of each view with d parameters: F^T F (d x d) and F^T r.
     pub views: Vec<f64>,
     /// Where each view begins in `views`.
     pub view_start: Vec<usize>,
+    /// `views` as far as each piece of work contributes, one after the other, and where each begins.
+    piece_views: Vec<f64>,
+    piece_views_start: Vec<usize>,
     piece_cost: Vec<f64>,
 }
 
 impl Linearised {
     pub fn new(layout: &Layout) -> Self {
-        let mut view_start = vec![0];
-        for view in &layout.views {
-            let d = view.row_len();
-            view_start.push(view_start[view_start.len() - 1] + d * d + d);
-        }
+        let pieces = layout.piece_count();
+        let view_start = layout.view_start();
+        let len = view_start[layout.views.len()];
         Self {
-            rows: vec![0.0; layout.obs.len() * layout.row_stride()],
             points: vec![PointNormal::default(); layout.slot_count()],
             w: vec![0.0; layout.w_len()],
-            views: vec![0.0; view_start[layout.views.len()]],
+            views: vec![0.0; len],
             view_start,
-            piece_cost: vec![0.0; layout.piece_count()],
+            piece_views: vec![0.0; len * pieces],
+            piece_views_start: (0..=pieces).map(|i| i * len).collect(),
+            piece_cost: vec![0.0; pieces],
         }
     }
 
     /// Computes the normal equations at `state`; returns the cost.
     pub fn update(&mut self, layout: &Layout, state: &State, loss: &Loss, parallel: bool) -> f64 {
         let pieces = &layout.pieces;
+        let view_start = &self.view_start;
         let data = (
-            Sliced::new(&mut self.rows, &pieces.rows),
+            Sliced::new(&mut self.piece_views, &self.piece_views_start),
             Sliced::new(&mut self.points, &pieces.slots),
             Sliced::new(&mut self.w, &pieces.w),
             Sliced::new(&mut self.piece_cost, &pieces.ones),
         );
-        for_each_piece(0..layout.piece_count(), data, parallel, &|piece, (rows, points, w, cost)| {
-            let (rows, points, w) = (rows.into_inner(), points.into_inner(), w.into_inner());
-            cost.into_inner()[0] = linearise_piece(layout, state, loss, piece, rows, points, w);
+        for_each_piece(0..layout.piece_count(), data, parallel, &|piece, (views, points, w, cost)| {
+            let mut normal = PieceNormal { view_start, views: views.into_inner(), points: points.into_inner(), w: w.into_inner() };
+            cost.into_inner()[0] = linearise_piece(layout, state, loss, piece, &mut normal);
         });
-        self.update_views(layout, parallel);
-        self.piece_cost.iter().sum()
-    }
-
-    fn update_views(&mut self, layout: &Layout, parallel: bool) {
-        if layout.row_len == 0 {
-            return;
-        }
-        let rows = &self.rows;
-        for_each_piece(0..layout.views.len(), Sliced::new(&mut self.views, &self.view_start), parallel, &|v, normal| {
-            let normal = normal.into_inner();
-            normal.fill(0.0);
-            let d = layout.views[v].row_len();
-            for &o in &layout.view_obs[layout.view_obs_start[v]..layout.view_obs_start[v + 1]] {
-                let row = &rows[o as usize * layout.row_stride()..][..layout.row_stride()];
-                let (f0, f1) = (&row[..d], &row[layout.row_len..layout.row_len + d]);
-                let [r0, r1] = [row[2 * layout.row_len], row[2 * layout.row_len + 1]];
-                let (h, g) = normal.split_at_mut(d * d);
-                for j in 0..d {
-                    let column = &mut h[j * d..(j + 1) * d];
-                    for i in j..d {
-                        column[i] += f0[i] * f0[j] + f1[i] * f1[j];
-                    }
-                    g[j] += f0[j] * r0 + f1[j] * r1;
+        // The pieces are added in order.
+        self.views.fill(0.0);
+        if !self.views.is_empty() {
+            for piece in self.piece_views.chunks_exact(self.views.len()) {
+                for (sum, x) in self.views.iter_mut().zip(piece) {
+                    *sum += x;
                 }
             }
-        });
+        }
+        self.piece_cost.iter().sum()
     }
 }
 
@@ -187,67 +172,60 @@ pub(super) fn linearise_observation(
     true
 }
 
-fn linearise_piece(
-    layout: &Layout,
-    state: &State,
-    loss: &Loss,
-    piece: usize,
-    rows: &mut [f64],
-    points: &mut [PointNormal],
-    w: &mut [f64],
-) -> f64 {
+/// What a piece of work writes.
+struct PieceNormal<'a> {
+    view_start: &'a [usize],
+    views: &'a mut [f64],
+    points: &'a mut [PointNormal],
+    w: &'a mut [f64],
+}
+
+fn linearise_piece(layout: &Layout, state: &State, loss: &Loss, piece: usize, normal: &mut PieceNormal<'_>) -> f64 {
     let mut cost = 0.0;
     let mut j = ObservationJacobian::default();
     let (first, end) = (layout.pieces.slots[piece], layout.pieces.slots[piece + 1]);
-    let first_obs = layout.slots[first].first_obs as usize;
-    w.fill(0.0);
+    let first_w = layout.slots[first].first_w;
+    normal.w.fill(0.0);
+    normal.views.fill(0.0);
     for s in first..end {
         let (slot, next) = (&layout.slots[s], &layout.slots[s + 1]);
-        let mut normal = PointNormal::default();
-        for o in slot.first_obs as usize..next.first_obs as usize {
-            let observation = &layout.obs[o];
+        let mut point = PointNormal::default();
+        for observation in &layout.obs[slot.first_obs as usize..next.first_obs as usize] {
             if !linearise_observation(layout, state, loss, &state.points[s], observation, &mut j) {
                 debug_assert!(false, "a state that is linearised was evaluated before");
                 j = ObservationJacobian::default();
             }
             cost += j.cost;
             let view = &layout.views[observation.view as usize];
-            if layout.row_len > 0 {
-                let d = view.row_len();
-                let row = &mut rows[(o - first_obs) * layout.row_stride()..][..layout.row_stride()];
-                row[..d].copy_from_slice(&j.rows[0][..d]);
-                row[layout.row_len..layout.row_len + d].copy_from_slice(&j.rows[1][..d]);
-                row[2 * layout.row_len..].copy_from_slice(&j.residual);
-            }
+            let v = observation.view as usize;
+            kernels::add_view(view.row_len(), &j, &mut normal.views[normal.view_start[v]..normal.view_start[v + 1]]);
             if !slot.free {
                 continue;
             }
-            let [e0, e1] = j.point;
-            let mut i = 0;
-            for a in 0..3 {
-                for b in 0..=a {
-                    normal.h[i] += e0[a] * e0[b] + e1[a] * e1[b];
-                    i += 1;
-                }
-                normal.g[a] += e0[a] * j.residual[0] + e1[a] * j.residual[1];
-            }
+            point.add(&j);
             for segment in 0..3 {
-                if observation.incidence[segment] == NONE {
-                    continue;
-                }
-                let incidence = &layout.incidences[(slot.first_incidence + observation.incidence[segment]) as usize];
-                let (start, dim) = (view.start[segment] as usize, view.dim(segment));
-                let (f0, f1) = (&j.rows[0][start..start + dim], &j.rows[1][start..start + dim]);
-                let first_w = layout.slots[first].first_w;
-                let columns = w[incidence.w - first_w..][..3 * dim].chunks_exact_mut(dim);
-                for (k, column) in columns.enumerate() {
-                    for i in 0..dim {
-                        column[i] += f0[i] * e0[k] + f1[i] * e1[k];
-                    }
+                if observation.incidence[segment] != NONE {
+                    let incidence = &layout.incidences[(slot.first_incidence + observation.incidence[segment]) as usize];
+                    let (start, dim) = (view.start[segment] as usize, view.dim(segment));
+                    kernels::add_product(dim, &j, start, &mut normal.w[incidence.w - first_w..][..3 * dim]);
                 }
             }
         }
-        points[s - first] = normal;
+        normal.points[s - first] = point;
     }
     cost
+}
+
+impl PointNormal {
+    fn add(&mut self, j: &ObservationJacobian) {
+        let [e0, e1] = j.point;
+        let mut i = 0;
+        for a in 0..3 {
+            for b in 0..=a {
+                self.h[i] += e0[a] * e0[b] + e1[a] * e1[b];
+                i += 1;
+            }
+            self.g[a] += e0[a] * j.residual[0] + e1[a] * j.residual[1];
+        }
+    }
 }

@@ -90,7 +90,7 @@ fn minimise(problem: &Problem, options: &AdjustOptions, layout: &Layout, state: 
     if layout.unknowns() == 0 && !layout.slots.iter().any(|s| s.free) {
         return Ok(outcome);
     }
-    let mut reduced = Reduced::new(layout, &kept);
+    let mut reduced = Reduced::new(layout, &kept, if parallel { rayon::current_num_threads() } else { 1 });
     let mut solver = Solver::new(layout, &reduced.pattern)?;
     let mut stepper = Stepper::new(layout);
     let mut candidate = state.clone();

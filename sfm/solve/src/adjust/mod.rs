@@ -6,6 +6,7 @@
 //! points and evaluates; `lm` decides.
 
 mod error;
+mod kernels;
 mod layout;
 mod lengths;
 mod linearise;

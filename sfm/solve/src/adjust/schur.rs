@@ -15,11 +15,13 @@
 //! ```
 //!
 //! S is stored as *panels*: panel a holds the columns of kept block a, by columns, with the rows of the blocks b >= a
-//! that a meets. A panel is made by walking the points of a in order: Y = C_p^-1 W_pa^T once, then W_pb Y for each b from
-//! a on in the list of p. Each panel is written by one thread and summed in one order, so no bit depends on threads.
+//! that a meets. Threads share the panels out; each walks the points in order and, for every block a of p that is its
+//! own, computes Y = C_p^-1 W_pa^T and subtracts W_pb Y for each b from a on in the list of p. Every element is summed by
+//! one thread in the order of the points, so no bit depends on the number of threads.
 //!
 //! Damping as in Ceres: D = diag(F^T F) / radius, after the scaled diagonal was clamped; see [`damping`].
 
+use super::kernels::subtract_product;
 use super::layout::{Layout, NONE};
 use super::lengths::KeptNormal;
 use super::linearise::{Linearised, PointNormal};
@@ -29,6 +31,8 @@ use scene::camera::MAX_CAMERA_PARAMS;
 
 /// The smallest share of a diagonal element that may remain as a pivot of a point's 3x3 matrix.
 const MIN_PIVOT: f64 = 1e-14;
+/// A group of panels is not made much larger than this, 2 MiB: the points scatter into it.
+const GROUP_VALUES: usize = 256 * 1024;
 
 /// What is added to the diagonal element h = |column|^2 of the normal matrix.
 ///
@@ -54,14 +58,20 @@ pub(super) struct Reduced {
     pub damping: Vec<f64>,
     /// C_p^-1, lower triangle by rows, by slot.
     pub point_inverse: Vec<[f64; 6]>,
+    groups: Groups,
+    /// Whether to use the copy of the elimination for AVX2; only true where the processor has it.
+    avx2: bool,
 }
 
 impl Reduced {
-    pub fn new(layout: &Layout, kept: &KeptNormal) -> Self {
-        Self::with_pattern(layout, Pattern::new(layout, kept))
+    /// `threads` is how many will work on it; no bit depends on that.
+    pub fn new(layout: &Layout, kept: &KeptNormal, threads: usize) -> Self {
+        Self::with_pattern(layout, Pattern::new(layout, kept), threads)
     }
 
-    pub fn with_pattern(layout: &Layout, pattern: Pattern) -> Self {
+    pub fn with_pattern(layout: &Layout, pattern: Pattern, threads: usize) -> Self {
+        // Some more groups than threads, since their work is only estimated.
+        let groups = if threads > 1 { 4 * threads } else { 1 };
         let n = layout.unknowns();
         Self {
             values: vec![0.0; pattern.len()],
@@ -69,8 +79,16 @@ impl Reduced {
             gradient: vec![0.0; n],
             damping: vec![0.0; n],
             point_inverse: vec![[0.0; 6]; layout.slot_count()],
+            groups: Groups::new(layout, &pattern, groups),
+            avx2: has_avx2(),
             pattern,
         }
+    }
+
+    /// Does without AVX2 from now on.
+    #[cfg(test)]
+    pub fn use_portable(&mut self) {
+        self.avx2 = false;
     }
 
     /// Eliminates the points for a trust region of the given radius.
@@ -81,20 +99,155 @@ impl Reduced {
                 *inverse = damped_inverse(&normal.h, radius);
             }
         });
-        let (pattern, point_inverse) = (&self.pattern, &self.point_inverse);
+        let avx2 = self.avx2;
+        let (pattern, groups, inverses) = (&self.pattern, &self.groups, &self.point_inverse);
+        let input = Input { layout, pattern, linear, kept, inverses, radius };
         let data = (
-            Sliced::new(&mut self.values, &pattern.panel_start),
-            Sliced::new(&mut self.rhs, &layout.offsets),
-            Sliced::new(&mut self.gradient, &layout.offsets),
-            Sliced::new(&mut self.damping, &layout.offsets),
+            Sliced::new(&mut self.values, &groups.values),
+            Sliced::new(&mut self.rhs, &groups.unknowns),
+            Sliced::new(&mut self.gradient, &groups.unknowns),
+            Sliced::new(&mut self.damping, &groups.unknowns),
         );
-        for_each_piece(0..layout.block_count(), data, parallel, &|a, (values, rhs, gradient, added)| {
-            let mut panel =
-                Panel { values: values.into_inner(), rhs: rhs.into_inner(), gradient: gradient.into_inner(), added: added.into_inner() };
-            panel.sum_kept(layout, pattern, linear, kept, a);
-            panel.damp(pattern, a, radius);
-            panel.eliminate_points(layout, pattern, linear, point_inverse, a);
+        for_each_piece(0..groups.blocks.len() - 1, data, parallel, &|group, (values, rhs, gradient, added)| {
+            let panels = Panels {
+                blocks: groups.blocks[group]..groups.blocks[group + 1],
+                values: values.into_inner(),
+                rhs: rhs.into_inner(),
+                gradient: gradient.into_inner(),
+                added: added.into_inner(),
+            };
+            panels.build(&input, avx2);
         });
+    }
+}
+
+fn has_avx2() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    let has = std::arch::is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    let has = false;
+    has
+}
+
+/// Runs of kept blocks whose panels one thread makes, and where each begins.
+#[derive(Debug)]
+struct Groups {
+    blocks: Vec<usize>,
+    values: Vec<usize>,
+    unknowns: Vec<usize>,
+}
+
+impl Groups {
+    /// At least `count` groups of about the same work where there are that many blocks, and more where the panels of a
+    /// group would not fit the cache. The grouping decides which thread sums an element, not in which order it is summed.
+    fn new(layout: &Layout, pattern: &Pattern, count: usize) -> Self {
+        let mut groups = Self { blocks: vec![0], values: vec![0], unknowns: vec![0] };
+        let most_work = layout.block_products.iter().sum::<usize>() / count.max(1);
+        let mut work = 0;
+        for a in 0..layout.block_count() {
+            work += layout.block_products[a];
+            let values = pattern.panel_start[a + 1] - groups.values[groups.values.len() - 1];
+            if (count > 1 && work >= most_work) || values >= GROUP_VALUES || a + 1 == layout.block_count() {
+                groups.blocks.push(a + 1);
+                groups.values.push(pattern.panel_start[a + 1]);
+                groups.unknowns.push(layout.offsets[a + 1]);
+                work = 0;
+            }
+        }
+        groups
+    }
+}
+
+/// What panels are made from.
+struct Input<'a> {
+    layout: &'a Layout,
+    pattern: &'a Pattern,
+    linear: &'a Linearised,
+    kept: &'a KeptNormal,
+    inverses: &'a [[f64; 6]],
+    radius: f64,
+}
+
+/// The panels of a group.
+struct Panels<'a> {
+    blocks: std::ops::Range<usize>,
+    values: &'a mut [f64],
+    rhs: &'a mut [f64],
+    gradient: &'a mut [f64],
+    added: &'a mut [f64],
+}
+
+impl Panels<'_> {
+    fn build(mut self, input: &Input<'_>, avx2: bool) {
+        for a in self.blocks.clone() {
+            self.panel(input, a).start(input, a);
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        debug_assert!(!avx2);
+        #[cfg(target_arch = "x86_64")]
+        if avx2 {
+            // SAFETY: `avx2` is only true where the processor has it.
+            unsafe { self.eliminate_avx2(input) };
+            return;
+        }
+        self.eliminate(input);
+    }
+
+    /// [`Panels::eliminate`] compiled for wider registers. Each element sees the same operations in the same order, and
+    /// none is fused, so the bits are the same.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn eliminate_avx2(&mut self, input: &Input<'_>) {
+        self.eliminate(input);
+    }
+
+    /// Subtracts what the points contribute, point by point as they lie in memory.
+    #[inline(always)]
+    fn eliminate(&mut self, input: &Input<'_>) {
+        let Input { layout, pattern, linear, inverses, .. } = *input;
+        let mut y = [[0.0; 3]; MAX_CAMERA_PARAMS];
+        for (s, slots) in layout.slots.windows(2).enumerate() {
+            let incidences = &layout.incidences[slots[0].first_incidence as usize..slots[1].first_incidence as usize];
+            let mut product = slots[0].first_product;
+            for (i, incidence) in incidences.iter().enumerate() {
+                let (a, others) = (incidence.block as usize, &incidences[i..]);
+                if a >= self.blocks.end {
+                    break;
+                }
+                if a >= self.blocks.start {
+                    let panel = self.panel(input, a);
+                    let dim_a = panel.rhs.len();
+                    let [c00, c10, c11, c20, c21, c22] = inverses[s];
+                    let h = &linear.points[s].g;
+                    let w = &linear.w[incidence.w..][..3 * dim_a];
+                    for j in 0..dim_a {
+                        let (w0, w1, w2) = (w[j], w[dim_a + j], w[2 * dim_a + j]);
+                        y[j] = [c00 * w0 + c10 * w1 + c20 * w2, c10 * w0 + c11 * w1 + c21 * w2, c20 * w0 + c21 * w1 + c22 * w2];
+                        panel.rhs[j] += y[j][0] * h[0] + y[j][1] * h[1] + y[j][2] * h[2];
+                    }
+                    for (k, other) in others.iter().enumerate() {
+                        let row = pattern.product_row(product + k, other.block);
+                        let dim_b = layout.dim(other.block as usize);
+                        subtract_product(dim_b, &mut panel.values[row..], pattern.stride[a], &linear.w[other.w..][..3 * dim_b], &y[..dim_a]);
+                    }
+                }
+                product += others.len();
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn panel(&mut self, input: &Input<'_>, a: usize) -> Panel<'_> {
+        let first_value = input.pattern.panel_start[self.blocks.start];
+        let values = input.pattern.panel_start[a] - first_value..input.pattern.panel_start[a + 1] - first_value;
+        let offsets = &input.layout.offsets;
+        let unknowns = offsets[a] - offsets[self.blocks.start]..offsets[a + 1] - offsets[self.blocks.start];
+        Panel {
+            values: &mut self.values[values],
+            rhs: &mut self.rhs[unknowns.clone()],
+            gradient: &mut self.gradient[unknowns.clone()],
+            added: &mut self.added[unknowns],
+        }
     }
 }
 
@@ -107,8 +260,18 @@ struct Panel<'a> {
 }
 
 impl Panel<'_> {
-    /// B and g: the views and the residuals that meet kept blocks only.
-    fn sum_kept(&mut self, layout: &Layout, pattern: &Pattern, linear: &Linearised, kept: &KeptNormal, a: usize) {
+    /// B and -g, before the points.
+    fn start(&mut self, input: &Input<'_>, a: usize) {
+        self.sum_kept(input, a);
+        self.damp(input.pattern, a, input.radius);
+        for (rhs, g) in self.rhs.iter_mut().zip(&*self.gradient) {
+            *rhs = -g;
+        }
+    }
+
+    /// F^T F and g: the views and the residuals that meet kept blocks only.
+    fn sum_kept(&mut self, input: &Input<'_>, a: usize) {
+        let Input { layout, pattern, linear, kept, .. } = *input;
         let (dim_a, stride) = (self.rhs.len(), pattern.stride[a]);
         self.values.fill(0.0);
         self.gradient.copy_from_slice(&kept.gradient[layout.offsets[a]..][..dim_a]);
@@ -148,63 +311,6 @@ impl Panel<'_> {
             let diagonal = &mut self.values[j * pattern.stride[a] + row + j];
             *added = damping(*diagonal, radius);
             *diagonal += *added;
-        }
-    }
-
-    fn eliminate_points(&mut self, layout: &Layout, pattern: &Pattern, linear: &Linearised, inverses: &[[f64; 6]], a: usize) {
-        let (dim_a, stride) = (self.rhs.len(), pattern.stride[a]);
-        let mut y = [[0.0; 3]; MAX_CAMERA_PARAMS];
-        let mut pair_rows = pattern.pair_rows(a);
-        for (rhs, g) in self.rhs.iter_mut().zip(&*self.gradient) {
-            *rhs = -g;
-        }
-        for &(slot, incidence) in &layout.block_points[layout.block_points_start[a]..layout.block_points_start[a + 1]] {
-            let [c00, c10, c11, c20, c21, c22] = inverses[slot as usize];
-            let h = &linear.points[slot as usize].g;
-            let w = &linear.w[layout.incidences[incidence as usize].w..][..3 * dim_a];
-            for j in 0..dim_a {
-                let (w0, w1, w2) = (w[j], w[dim_a + j], w[2 * dim_a + j]);
-                y[j] = [c00 * w0 + c10 * w1 + c20 * w2, c10 * w0 + c11 * w1 + c21 * w2, c20 * w0 + c21 * w1 + c22 * w2];
-                self.rhs[j] += y[j][0] * h[0] + y[j][1] * h[1] + y[j][2] * h[2];
-            }
-            let y = &y[..dim_a];
-            for other in &layout.incidences[incidence as usize..layout.slots[slot as usize + 1].first_incidence as usize] {
-                let row = pair_rows.next(&layout.offsets, other.block);
-                let dim_b = layout.dim(other.block as usize);
-                subtract_product(dim_b, &mut self.values[row..], stride, &linear.w[other.w..][..3 * dim_b], y);
-            }
-        }
-    }
-}
-
-/// Subtracts W Y from the rows at the start of `panel`; W has `dim` rows and stands by columns.
-#[inline]
-fn subtract_product(dim: usize, panel: &mut [f64], stride: usize, w: &[f64], y: &[[f64; 3]]) {
-    match dim {
-        1 => subtract_fixed::<1>(panel, stride, w, y),
-        2 => subtract_fixed::<2>(panel, stride, w, y),
-        3 => subtract_fixed::<3>(panel, stride, w, y),
-        4 => subtract_fixed::<4>(panel, stride, w, y),
-        5 => subtract_fixed::<5>(panel, stride, w, y),
-        6 => subtract_fixed::<6>(panel, stride, w, y),
-        7 => subtract_fixed::<7>(panel, stride, w, y),
-        8 => subtract_fixed::<8>(panel, stride, w, y),
-        9 => subtract_fixed::<9>(panel, stride, w, y),
-        _ => subtract_fixed::<10>(panel, stride, w, y),
-    }
-}
-
-#[inline(always)]
-fn subtract_fixed<const D: usize>(panel: &mut [f64], stride: usize, w: &[f64], y: &[[f64; 3]]) {
-    let (Ok(w0), Ok(w1), Ok(w2)) =
-        (<&[f64; D]>::try_from(&w[..D]), <&[f64; D]>::try_from(&w[D..2 * D]), <&[f64; D]>::try_from(&w[2 * D..3 * D]))
-    else {
-        unreachable!("slices of D elements")
-    };
-    for (j, y) in y.iter().enumerate() {
-        let column = &mut panel[j * stride..j * stride + D];
-        for i in 0..D {
-            column[i] -= w0[i] * y[0] + w1[i] * y[1] + w2[i] * y[2];
         }
     }
 }

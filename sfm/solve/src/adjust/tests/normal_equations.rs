@@ -47,7 +47,7 @@ fn iterate(problem: &Problem, make_pattern: impl Fn(&Layout, &KeptNormal) -> Pat
     let mut linear = Linearised::new(&layout);
     let mut kept = KeptNormal::new(problem, &layout, &state, &loss);
     let cost = linear.update(&layout, &state, &loss, false) + kept.update(problem, &layout, &state, &loss);
-    let mut reduced = Reduced::with_pattern(&layout, make_pattern(&layout, &kept));
+    let mut reduced = Reduced::with_pattern(&layout, make_pattern(&layout, &kept), 2);
     let mut solver = Solver::new(&layout, &reduced.pattern).expect("memory");
     reduced.build(&layout, &linear, &kept, RADIUS, false);
     assert!(solver.solve(&mut reduced));
@@ -155,4 +155,28 @@ fn fixed_blocks_have_no_unknowns() {
     let mut problem = everything(CameraModel::Radial, 3);
     problem.points.iter_mut().for_each(|p| p.free = false);
     check(&problem, |layout, _| Pattern::dense(layout));
+}
+
+#[test]
+fn vector_width_and_grouping_change_no_bit() {
+    let problem = everything(CameraModel::Brown, 3);
+    let mut state = State::new(&problem);
+    let layout = Layout::new(&problem, &mut state);
+    state.load_points(&problem, &layout);
+    let mut linear = Linearised::new(&layout);
+    let mut kept = KeptNormal::new(&problem, &layout, &state, &Loss::Trivial);
+    linear.update(&layout, &state, &Loss::Trivial, false);
+    kept.update(&problem, &layout, &state, &Loss::Trivial);
+    for make_pattern in [|l: &Layout, _: &KeptNormal| Pattern::dense(l), Pattern::sparse] {
+        let build = |threads: usize, portable: bool| {
+            let mut reduced = Reduced::with_pattern(&layout, make_pattern(&layout, &kept), threads);
+            if portable {
+                reduced.use_portable();
+            }
+            reduced.build(&layout, &linear, &kept, RADIUS, threads > 1);
+            reduced.values.iter().chain(&reduced.rhs).map(|x| x.to_bits()).collect::<Vec<_>>()
+        };
+        let reference = build(1, true);
+        assert!(reference == build(1, false) && reference == build(2, true) && reference == build(5, false));
+    }
 }
