@@ -3,7 +3,7 @@
 //! The parts, in the order in which they work: [`problem`](Problem) is sorted into a `layout`, values live in `state`;
 //! `linearise` makes the normal equations of the observations and `lengths` those of everything else; `schur` eliminates
 //! the points into a system whose `pattern` is dense or sparse; `solve_reduced` factorises it; `step` goes back to the
-//! points and evaluates; `lm` decides.
+//! points and evaluates; `lm` decides. `kernels` has the inner loops, `pieces` the parallel ones.
 
 mod error;
 mod kernels;

@@ -228,7 +228,13 @@ impl Panels<'_> {
                     for (k, other) in others.iter().enumerate() {
                         let row = pattern.product_row(product + k, other.block);
                         let dim_b = layout.dim(other.block as usize);
-                        subtract_product(dim_b, &mut panel.values[row..], pattern.stride[a], &linear.w[other.w..][..3 * dim_b], &y[..dim_a]);
+                        subtract_product(
+                            dim_b,
+                            &mut panel.values[row..],
+                            pattern.stride[a],
+                            &linear.w[other.w..][..3 * dim_b],
+                            &y[..dim_a],
+                        );
                     }
                 }
                 product += others.len();

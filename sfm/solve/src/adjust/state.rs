@@ -1,6 +1,6 @@
 //! Parameter values, and how a step changes them.
 
-use super::layout::{Layout, NONE, Owner, View};
+use super::layout::{Layout, Owner, View};
 use super::problem::Problem;
 use crate::lie::so3_exp;
 use nalgebra::{Matrix3, Vector3};
@@ -98,8 +98,7 @@ impl State {
     }
 
     pub fn store(&self, problem: &mut Problem, layout: &Layout) {
-        for (b, &owner) in layout.owners.iter().enumerate() {
-            debug_assert!(b as u32 != NONE);
+        for &owner in &layout.owners {
             match owner {
                 Owner::Frame(i) => problem.frames[i as usize].pose = self.frames[i as usize],
                 Owner::Sensor(i) => problem.sensors[i as usize].pose = self.sensors[i as usize],
