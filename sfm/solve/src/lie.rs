@@ -49,7 +49,7 @@ pub fn so3_log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
 
 /// d log(exp(e) R) / d e at e = 0, for R = exp(w): the inverse of the left Jacobian of SO(3) at w.
 ///
-/// I - [w]/2 + (1/a2 - (1 + cos a) / (2 a sin a)) [w]^2 with a = |w|. Valid for a < 2 pi; at a = 2 pi it does not exist.
+/// `I - [w]/2 + (1/a2 - (1 + cos a) / (2 a sin a)) [w]^2` with a = |w|. Valid for a < 2 pi; at a = 2 pi it does not exist.
 #[must_use]
 pub fn so3_left_jacobian_inverse(w: &Vector3<f64>) -> Matrix3<f64> {
     let squared = w.norm_squared();
