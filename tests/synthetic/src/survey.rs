@@ -7,6 +7,9 @@ use scene::{
     Rig, RigId, RigSensor, Rigid3, Scale, VerifiedPair,
 };
 
+/// Length of the part of the sea bed that is there twice, metres.
+pub const LOOK_ALIKE_LENGTH_M: f64 = 2.0;
+
 /// What to make.
 #[derive(Clone, Debug)]
 pub struct SurveyOptions {
@@ -28,6 +31,16 @@ pub struct SurveyOptions {
     pub outlier_share: f64,
     /// Fewest matches of a pair.
     pub min_matches: usize,
+    /// Height of the relief, as a share of the usual one; 0 makes the sea bed a plane.
+    pub relief: f64,
+    /// Standard deviation of the place of every camera but the first along each axis of the rig, from one exposure to
+    /// the next, metres. Above 0 the truth holds a frame for each image, and no rig.
+    pub mount_play_m: f64,
+    /// Exposures that a camera missed: (exposure, camera).
+    pub missed: Vec<(usize, usize)>,
+    /// Way along the path, metres, after which what lies in its first [`LOOK_ALIKE_LENGTH_M`] is there once more, as sister
+    /// ships or the legs of a jetty are. Matches take the two for one wherever they can.
+    pub look_alike_m: Option<f64>,
     /// Seed.
     pub seed: u64,
 }
@@ -45,6 +58,10 @@ impl Default for SurveyOptions {
             noise_px: 0.0,
             outlier_share: 0.0,
             min_matches: 30,
+            relief: 1.0,
+            mount_play_m: 0.0,
+            missed: Vec::new(),
+            look_alike_m: None,
             seed: 0,
         }
     }
@@ -67,20 +84,36 @@ pub struct Survey {
 pub fn survey(options: &SurveyOptions) -> Survey {
     assert!(options.cameras > 0, "a survey needs a camera");
     let mut random = Random::new(options.seed);
-    let sensors = (0..options.cameras).map(|c| RigSensor { camera: CameraId::new(c), cam_from_rig: cam_from_rig(options, c) }).collect();
-    let rig = Rig { sensors };
-    let frames: Vec<Frame> = (0..options.exposures)
-        .map(|e| Frame { rig: RigId(0), exposure: e as u32, rig_from_world: Some(rig_from_world(options, e, &mut random)) })
-        .collect();
-    let mut images = Vec::new();
-    for (e, _) in frames.iter().enumerate() {
-        for c in 0..options.cameras {
-            images.push(Image { name: format!("C{}/{e:04}.png", c + 1), camera: CameraId::new(c), frame: FrameId::new(e) });
+    let mount: Vec<Rigid3> = (0..options.cameras).map(|c| cam_from_rig(options, c)).collect();
+    let single = options.mount_play_m > 0.0;
+    let rigs = if single {
+        (0..options.cameras).map(|c| Rig::single(CameraId::new(c))).collect()
+    } else {
+        vec![Rig {
+            sensors: (0..).map(CameraId::new).zip(&mount).map(|(camera, &cam_from_rig)| RigSensor { camera, cam_from_rig }).collect(),
+        }]
+    };
+    let (mut frames, mut images) = (Vec::new(), Vec::new());
+    for e in 0..options.exposures {
+        let pose = rig_from_world(options, e, &mut random);
+        if !single {
+            frames.push(Frame { rig: RigId(0), exposure: e as u32, rig_from_world: Some(pose) });
+        }
+        for (c, &mounted) in mount.iter().enumerate() {
+            let play = if single && c > 0 { normal3(&mut random) * options.mount_play_m } else { Vector3::zeros() };
+            if options.missed.contains(&(e, c)) {
+                continue;
+            }
+            if single {
+                let cam_from_rig = Rigid3::new(mounted.rotation, mounted.translation - mounted.rotation * play);
+                frames.push(Frame { rig: RigId::new(c), exposure: e as u32, rig_from_world: Some(cam_from_rig * pose) });
+            }
+            images.push(Image { name: format!("C{}/{e:04}.png", c + 1), camera: CameraId::new(c), frame: FrameId::new(frames.len() - 1) });
         }
     }
     let mut truth = Reconstruction {
         cameras: vec![options.camera; options.cameras],
-        rigs: vec![rig],
+        rigs,
         frames,
         keypoints: vec![Vec::new(); images.len()],
         images,
@@ -88,7 +121,8 @@ pub fn survey(options: &SurveyOptions) -> Survey {
         scale: Scale::Metric,
     };
     scatter(&mut truth, options, &mut random);
-    let pairs = matches(&mut truth, options, &mut random);
+    let twins = repeat(&mut truth, options, &mut random);
+    let pairs = matches(&mut truth, &twins, options, &mut random);
     Survey { truth, pairs }
 }
 
@@ -113,33 +147,67 @@ fn rig_from_world(options: &SurveyOptions, exposure: usize, random: &mut Random)
     Rigid3::new(rotation, -(rotation * centre))
 }
 
+fn normal3(random: &mut Random) -> Vector3<f64> {
+    Vector3::new(random.normal(), random.normal(), random.normal())
+}
+
 fn scatter(truth: &mut Reconstruction, options: &SurveyOptions, random: &mut Random) {
     let length = options.step_m * options.exposures as f64;
     for _ in 0..options.points {
         let (x, y) = (random.range(-3.0, length + 4.0), random.range(-3.0, 3.0));
-        let xyz = Vector3::new(x, y, 0.4 * (0.9 * x).sin() + 0.3 * (1.3 * y).cos() + 0.1 * random.normal());
-        let mut track = Vec::new();
-        for i in 0..truth.images.len() {
-            let image = ImageId::new(i);
-            let Some(pose) = truth.cam_from_world(image) else { continue };
-            let Some(pixel) = options.camera.project(&pose.apply(&xyz)) else { continue };
-            let seen = pixel + Vector2::new(random.normal(), random.normal()) * options.noise_px;
-            let inside = |v: f64, size: u32| v >= 0.0 && v < f64::from(size);
-            if inside(seen.x, options.camera.width()) && inside(seen.y, options.camera.height()) {
-                track.push(Observation { image, keypoint: KeypointIndex::new(truth.keypoints[i].len()) });
-                truth.keypoints[i].push([seen.x as f32, seen.y as f32]);
-            }
-        }
-        truth.points.push(Point { xyz, colour: [128; 3], error_px: 0.0, track });
+        let height = 0.4 * (0.9 * x).sin() + 0.3 * (1.3 * y).cos() + 0.1 * random.normal();
+        show(truth, Vector3::new(x, y, options.relief * height), options, random);
     }
 }
 
-fn matches(truth: &mut Reconstruction, options: &SurveyOptions, random: &mut Random) -> Vec<VerifiedPair> {
+/// Adds a point, and a keypoint wherever it is seen.
+fn show(truth: &mut Reconstruction, xyz: Vector3<f64>, options: &SurveyOptions, random: &mut Random) {
+    let mut track = Vec::new();
+    for i in 0..truth.images.len() {
+        let image = ImageId::new(i);
+        let Some(pose) = truth.cam_from_world(image) else { continue };
+        let Some(pixel) = options.camera.project(&pose.apply(&xyz)) else { continue };
+        let seen = pixel + Vector2::new(random.normal(), random.normal()) * options.noise_px;
+        let inside = |v: f64, size: u32| v >= 0.0 && v < f64::from(size);
+        if inside(seen.x, options.camera.width()) && inside(seen.y, options.camera.height()) {
+            track.push(Observation { image, keypoint: KeypointIndex::new(truth.keypoints[i].len()) });
+            truth.keypoints[i].push([seen.x as f32, seen.y as f32]);
+        }
+    }
+    truth.points.push(Point { xyz, colour: [128; 3], error_px: 0.0, track });
+}
+
+/// Adds what is there once more; returns which points look the same.
+fn repeat(truth: &mut Reconstruction, options: &SurveyOptions, random: &mut Random) -> Vec<(usize, usize)> {
+    let Some(way) = options.look_alike_m else { return Vec::new() };
+    let mut twins = Vec::new();
+    for p in 0..truth.points.len() {
+        let xyz = truth.points[p].xyz;
+        if (0.0..LOOK_ALIKE_LENGTH_M).contains(&xyz.x) {
+            twins.push((p, truth.points.len()));
+            show(truth, xyz + Vector3::x() * way, options, random);
+        }
+    }
+    twins
+}
+
+fn matches(truth: &mut Reconstruction, twins: &[(usize, usize)], options: &SurveyOptions, random: &mut Random) -> Vec<VerifiedPair> {
     let count = truth.images.len();
     let mut found = vec![Vec::new(); count * count];
     for point in &truth.points {
         for (i, a) in point.track.iter().enumerate() {
             for b in &point.track[i + 1..] {
+                found[a.image.index() * count + b.image.index()].push((a.keypoint, b.keypoint));
+            }
+        }
+    }
+    for &(p, q) in twins {
+        let sees = |track: &[Observation], image| track.iter().any(|o| o.image == image);
+        let (one, other) = (&truth.points[p].track, &truth.points[q].track);
+        // An image that sees both tells them apart.
+        for a in one.iter().filter(|a| !sees(other, a.image)) {
+            for b in other.iter().filter(|b| !sees(one, b.image)) {
+                let (a, b) = if a.image < b.image { (a, b) } else { (b, a) };
                 found[a.image.index() * count + b.image.index()].push((a.keypoint, b.keypoint));
             }
         }
@@ -211,6 +279,37 @@ mod tests {
             let right = pair.matches.iter().filter(|(a, _)| shown[pair.images.0.index()][a.index()]).count();
             assert_eq!(pair.matches.len() - right, right / 4);
         }
+    }
+
+    #[test]
+    fn play_in_the_mount_is_as_large_as_asked_for() {
+        let options = SurveyOptions { cameras: 2, exposures: 400, points: 0, mount_play_m: 0.01, ..SurveyOptions::default() };
+        let truth = survey(&options).truth;
+        assert_eq!(truth.frames.len(), truth.images.len());
+        let centre = |i: usize| truth.cam_from_world(ImageId::new(i)).expect("oriented").centre();
+        let lengths: Vec<f64> = (0..400).map(|e| (centre(2 * e) - centre(2 * e + 1)).norm()).collect();
+        let mean = lengths.iter().sum::<f64>() / 400.0;
+        let deviation = (lengths.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 399.0).sqrt();
+        // The standard error of a standard deviation from 400 values is 1 / sqrt(800) = 3.5 % of it: four of them.
+        assert!((deviation / 0.01 - 1.0).abs() < 0.14, "{deviation}");
+    }
+
+    #[test]
+    fn a_missed_exposure_takes_only_its_own_image() {
+        let options = SurveyOptions { cameras: 2, exposures: 3, points: 50, ..SurveyOptions::default() };
+        let missed = survey(&SurveyOptions { missed: vec![(1, 1)], ..options.clone() }).truth;
+        let names: Vec<&str> = missed.images.iter().map(|i| i.name.as_str()).collect();
+        assert_eq!(names, ["C1/0000.png", "C2/0000.png", "C1/0001.png", "C1/0002.png", "C2/0002.png"]);
+        assert_eq!(missed.frames, survey(&options).truth.frames);
+    }
+
+    #[test]
+    fn places_that_look_alike_are_matched_with_each_other() {
+        let apart = SurveyOptions { exposures: 14, ..SurveyOptions::default() };
+        let alike = SurveyOptions { look_alike_m: Some(5.0), ..apart.clone() };
+        let far = |options: &SurveyOptions| survey(options).pairs.iter().filter(|p| p.images.1.0 - p.images.0.0 > 6).count();
+        assert_eq!(far(&apart), 0);
+        assert!(far(&alike) > 2, "{}", far(&alike));
     }
 
     #[test]
