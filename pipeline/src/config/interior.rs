@@ -33,7 +33,7 @@ pub(super) fn resolve(source: &mut Source<'_>, folder: &Path, raw: Option<&Spann
             Some("give either `file`, or the model and its parameters".to_owned()),
         );
     }
-    let path = folder.join(file.get_ref());
+    let path = folder.join(file.get_ref().as_str());
     match std::fs::read_to_string(&path) {
         Err(e) => source.problem(Some(file.span()), key, format!("cannot read {}: {e}", path.display()), None),
         Ok(text) => match read_file(&path, &text) {

@@ -74,7 +74,7 @@ pub const KEYS: &[(&str, &str)] = &[
     ("mask.reach", "a share from 0 to 1"),
     ("mask.min_texture", "a share from 0 to 1"),
     ("features.max_keypoints", "a whole number above 0"),
-    ("features.double_image", "true or false"),
+    ("features.double_up_to_mpx", "a number of megapixels"),
     ("features.contrast_threshold", "a number from 0 to 1"),
     ("matching.pairs", "\"auto\", \"exhaustive\" or \"sequential\""),
     ("matching.exhaustive_up_to", "a whole number of images"),

@@ -5,6 +5,7 @@ mod files;
 mod interior;
 mod keys;
 mod model;
+mod path_text;
 mod raw;
 mod resolve;
 mod rig;

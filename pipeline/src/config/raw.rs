@@ -1,5 +1,6 @@
 //! The file as written: every value optional, with its place in the text. Nothing is checked here but names and types.
 
+use super::path_text::PathText;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use toml::Spanned;
@@ -26,7 +27,7 @@ pub(super) struct RawConfig {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawDive {
     pub(super) name: Place<String>,
-    pub(super) output: Place<String>,
+    pub(super) output: Place<PathText>,
     pub(super) frames_from: Place<String>,
 }
 
@@ -34,11 +35,11 @@ pub(super) struct RawDive {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawCamera {
     pub(super) name: Place<String>,
-    pub(super) images: Place<String>,
-    pub(super) video: Place<String>,
+    pub(super) images: Place<PathText>,
+    pub(super) video: Place<PathText>,
     pub(super) rate_hz: Place<f64>,
     pub(super) offset_secs: Place<f64>,
-    pub(super) mask: Place<String>,
+    pub(super) mask: Place<PathText>,
     pub(super) interior: Place<RawInterior>,
 }
 
@@ -48,7 +49,7 @@ macro_rules! raw_interior {
         #[derive(Debug, Default, Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub(super) struct RawInterior {
-            pub(super) file: Place<String>,
+            pub(super) file: Place<PathText>,
             pub(super) model: Place<String>,
             pub(super) width: Place<u32>,
             pub(super) height: Place<u32>,
@@ -133,7 +134,7 @@ pub(super) struct RawMask {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawFeatures {
     pub(super) max_keypoints: Place<u32>,
-    pub(super) double_image: Place<bool>,
+    pub(super) double_up_to_mpx: Place<f64>,
     pub(super) contrast_threshold: Place<f64>,
 }
 
@@ -173,8 +174,8 @@ pub(super) struct RawDensify {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawEvaluate {
-    pub(super) reference: Place<String>,
-    pub(super) positions: Place<String>,
+    pub(super) reference: Place<PathText>,
+    pub(super) positions: Place<PathText>,
     pub(super) threshold_m: Place<f64>,
     pub(super) density_radius_m: Place<f64>,
     pub(super) grid_m: Place<f64>,

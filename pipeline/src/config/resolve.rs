@@ -130,11 +130,11 @@ fn cameras(source: &mut Source<'_>, raw: &[Spanned<RawCamera>], folder: &Path) -
         }
         let images = images(source, camera, entry.span(), folder);
         let mask = camera.mask.as_ref().map(|place| {
-            if !place.get_ref().contains("{stem}") {
+            if !place.get_ref().as_str().contains("{stem}") {
                 let hint = "{stem} stands for the image's name without extension".to_owned();
                 source.problem(Some(place.span()), "camera.mask", "has no {stem} in it", Some(hint));
             }
-            MaskPattern { folder: folder.to_path_buf(), pattern: place.get_ref().clone() }
+            MaskPattern { folder: folder.to_path_buf(), pattern: place.get_ref().as_str().to_owned() }
         });
         let interior = interior::resolve(source, folder, camera.interior.as_ref());
         // A wrong source leaves a camera without images, so that names in other tables still resolve.
@@ -164,13 +164,14 @@ fn images(source: &mut Source<'_>, camera: &RawCamera, entry: Range<usize>, fold
                     source.problem(Some(place.span()), &format!("camera.{key}"), "only a video has it", None);
                 }
             }
-            let (message, hint) = match image_files(folder, images.get_ref()) {
+            let (message, hint) = match image_files(folder, images.get_ref().as_str()) {
                 Ok(files) => return Some(ImageSource::Files(files)),
                 Err(NoFiles::Pattern(message)) => (format!("is not a pattern: {message}"), None),
                 Err(NoFiles::Unreadable(message)) => (format!("cannot be searched: {message}"), None),
-                Err(NoFiles::Nothing) => {
-                    (format!("no image at {}", folder.join(images.get_ref()).display()), near_hint(folder, images.get_ref()))
-                }
+                Err(NoFiles::Nothing) => (
+                    format!("no image at {}", folder.join(images.get_ref().as_str()).display()),
+                    near_hint(folder, images.get_ref().as_str()),
+                ),
             };
             source.problem(Some(images.span()), "camera.images", message, hint);
             None
@@ -179,9 +180,9 @@ fn images(source: &mut Source<'_>, camera: &RawCamera, entry: Range<usize>, fold
             let mut values = Values { source };
             let rate_hz = values.positive("camera.rate_hz", &camera.rate_hz).unwrap_or(DEFAULT_RATE_HZ);
             let offset_secs = values.within("camera.offset_secs", &camera.offset_secs, 0.0, 1e9, 0.0);
-            let file = folder.join(video.get_ref());
+            let file = folder.join(video.get_ref().as_str());
             if !file.is_file() {
-                let hint = near_hint(folder, video.get_ref());
+                let hint = near_hint(folder, video.get_ref().as_str());
                 source.problem(Some(video.span()), "camera.video", format!("there is no file {}", file.display()), hint);
             }
             Some(ImageSource::Video { file, rate_hz, offset_secs })

@@ -82,8 +82,8 @@ pub struct IpConfig {
 pub struct FeaturesConfig {
     /// Most keypoints an image.
     pub max_keypoints: u32,
-    /// Doubles the image first.
-    pub double_image: bool,
+    /// Images of at most so many megapixels are doubled first.
+    pub double_up_to_mpx: f64,
     /// Least contrast of a keypoint, grey values in 0..=1.
     pub contrast_threshold: f64,
 }

@@ -2,6 +2,7 @@
 
 use super::error::Source;
 use super::model::CameraConfig;
+use super::path_text::PathText;
 use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport};
 use super::stage_options::{
     DenseQuality, DensifyConfig, EvaluateConfig, FeaturesConfig, IpConfig, MaskConfig, MaskStrategy, MatchingConfig, OrientConfig,
@@ -10,6 +11,9 @@ use super::stage_options::{
 use super::values::Values;
 use std::path::Path;
 use toml::Spanned;
+
+/// Full HD and less: what so few pixels show is worth the time, and their finer keypoints are twice as precise.
+const DOUBLE_UP_TO_MPX: f64 = 2.1;
 
 pub(super) fn mask(source: &mut Source<'_>, raw: &RawMask, cameras: &[CameraConfig]) -> MaskConfig {
     let mut values = Values { source };
@@ -71,7 +75,7 @@ pub(super) fn features(source: &mut Source<'_>, raw: &RawFeatures) -> FeaturesCo
     let contrast = f64::from(default.contrast_threshold);
     FeaturesConfig {
         max_keypoints: values.count("features.max_keypoints", &raw.max_keypoints, 100, 100_000, default.max_features as u32),
-        double_image: flag(&raw.double_image, default.double_image),
+        double_up_to_mpx: values.within("features.double_up_to_mpx", &raw.double_up_to_mpx, 0.0, 1000.0, DOUBLE_UP_TO_MPX),
         contrast_threshold: values.within("features.contrast_threshold", &raw.contrast_threshold, 1e-6, 1.0, contrast),
     }
 }
@@ -128,9 +132,9 @@ pub(super) fn densify(source: &mut Source<'_>, raw: &RawDensify) -> DensifyConfi
 }
 
 pub(super) fn evaluate(source: &mut Source<'_>, raw: &RawEvaluate, folder: &Path) -> EvaluateConfig {
-    let mut file = |key: &str, place: &Option<Spanned<String>>| {
+    let mut file = |key: &str, place: &Option<Spanned<PathText>>| {
         let place = place.as_ref()?;
-        let path = folder.join(place.get_ref());
+        let path = folder.join(place.get_ref().as_str());
         if !path.is_file() {
             source.problem(Some(place.span()), key, format!("there is no file {}", path.display()), None);
         }

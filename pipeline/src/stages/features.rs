@@ -14,7 +14,7 @@ use scene::{Keypoint, Mask, Raster};
 use serde_json::{Value, json};
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "features", version: 1, upstream: &["ingest", "mask"], options, inputs: no_inputs, work };
+pub const STAGE: Stage = Stage { name: "features", version: 2, upstream: &["ingest", "mask"], options, inputs: no_inputs, work };
 
 /// An image of fewer keypoints is told.
 const FEW: usize = 100;
@@ -128,7 +128,7 @@ fn extract(work: &Work<'_>, grey: &Raster<f32>, rgb: &Raster<[u8; 3]>, mask: Opt
     let config = &work.config.features;
     let options = SiftOptions {
         max_features: config.max_keypoints as usize,
-        double_image: config.double_image,
+        double_image: (grey.width() * grey.height()) as f64 <= 1e6 * config.double_up_to_mpx,
         contrast_threshold: config.contrast_threshold as f32,
         ..SiftOptions::default()
     };

@@ -3,14 +3,17 @@
 use super::images::{CameraEntry, ImageList};
 use crate::config::{Config, InteriorConfig};
 use crate::store::Warning;
+use ::features::{PairForInterior, interior_from_pairs};
 use anyhow::{Result, bail};
-use scene::Camera;
 use scene::camera::ParamKind;
+use scene::{Camera, ImageId, Keypoint, VerifiedPair};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 /// The guess of a focal length of which nothing is known, over the longer side of the image: COLMAP's, a view of 45 degrees.
 const GUESS: f64 = 1.2;
+/// Other guesses: action cameras in air, and lenses longer than the first guess.
+const FURTHER_GUESSES: [f64; 3] = [0.7, 0.95, 1.9];
 /// Largest difference of the aspects of a calibration and the images that it is used for.
 const ASPECT_TOLERANCE: f64 = 0.01;
 
@@ -35,13 +38,15 @@ pub struct Start {
     pub fixed: bool,
     /// Where they come from.
     pub origin: Origin,
+    /// What else a guess could be.
+    pub alternatives: Vec<Camera>,
 }
 
 impl Start {
     /// Whether the values come from a calibration or from EXIF, not from a guess.
     #[must_use]
     pub fn is_known(&self) -> bool {
-        self.origin != Origin::Guess
+        matches!(self.origin, Origin::Given | Origin::Exif)
     }
 }
 
@@ -68,14 +73,46 @@ fn start(interior: &InteriorConfig, entry: &CameraEntry, warnings: &mut Vec<Warn
     let (width, height) = entry.size.unwrap_or((1, 1));
     if !interior.params.is_empty() {
         let camera = given(interior, entry, (width, height), warnings)?;
-        return Ok(Start { camera, fixed: interior.fixed, origin: Origin::Given });
+        return Ok(Start { camera, fixed: interior.fixed, origin: Origin::Given, alternatives: Vec::new() });
     }
     let (focal, origin) = match entry.exif_focal_px {
         Some(focal) => (focal, Origin::Exif),
         None => (GUESS * f64::from(width.max(height)), Origin::Guess),
     };
     let camera = Camera::from_focal(interior.model, width, height, focal)?;
-    Ok(Start { camera, fixed: false, origin })
+    Ok(Start { camera, fixed: false, origin, alternatives: Vec::new() })
+}
+
+/// Adds to each guess what else it could be: what the verified pairs of the camera tell, where they tell anything, and other focal lengths.
+///
+/// # Errors
+/// When a camera cannot have such a focal length, which cannot be.
+pub fn add_alternatives(
+    starts: &mut [Start],
+    list: &ImageList,
+    keypoints: &[Vec<Keypoint>],
+    pairs: &[VerifiedPair],
+    config: &Config,
+) -> Result<()> {
+    let camera_of = |image: ImageId| list.images[image.index()].camera;
+    for (c, start) in starts.iter_mut().enumerate().filter(|(_, s)| s.origin == Origin::Guess) {
+        let own: Vec<PairForInterior<'_>> = pairs
+            .iter()
+            .filter(|pair| camera_of(pair.images.0) == c && camera_of(pair.images.1) == c)
+            .map(|pair| PairForInterior { pair, keypoints: (&keypoints[pair.images.0.index()], &keypoints[pair.images.1.index()]) })
+            .collect();
+        let (model, size) = (start.camera.model(), (start.camera.width(), start.camera.height()));
+        let longer = f64::from(size.0.max(size.1));
+        let found = interior_from_pairs(&own, size, config.matching.max_error_px, u64::from(config.orient.seed));
+        let focals = found.and_then(|f| f.focal_px).into_iter().chain(FURTHER_GUESSES.map(|g| g * longer));
+        for focal in focals {
+            start.alternatives.push(match &found {
+                Some(found) => found.with_focal(model, focal)?,
+                None => Camera::from_focal(model, size.0, size.1, focal)?,
+            });
+        }
+    }
+    Ok(())
 }
 
 fn given(interior: &InteriorConfig, entry: &CameraEntry, (width, height): (u32, u32), warnings: &mut Vec<Warning>) -> Result<Camera> {

@@ -1,11 +1,10 @@
 //! Where every camera stood, and where the points are.
 
-use super::images::ImageList;
+use super::images::{ImageEntry, ImageList};
 use super::interior::{self, Start};
 use super::{features, matching, model};
 use crate::config::{Config, RigMode, ScaleBarConfig};
 use crate::error::NoResult;
-use crate::formats::StoredFeatures;
 use crate::stage::{Outcome, Stage, Work, no_inputs};
 use crate::store::Warning;
 use anyhow::{Context, Result};
@@ -14,12 +13,17 @@ use mapping::{
     ScaleBarInput,
 };
 use rayon::prelude::*;
-use scene::{CameraId, ImageId, Reconstruction, Scale};
+use scene::{CameraId, ImageId, Keypoint, Reconstruction, Scale};
 use serde_json::{Value, json};
 
 /// The stage.
 pub const STAGE: Stage =
-    Stage { name: "orient", version: 1, upstream: &["ingest", "features", "matching"], options, inputs: no_inputs, work };
+    Stage { name: "orient", version: 2, upstream: &["ingest", "features", "matching"], options, inputs: no_inputs, work };
+
+/// Standard deviation of a keypoint's position over its scale: what was found in a coarser image is as much less precise (Zeisl, Georgel,
+/// Schweiger, Steinbach & Navab, *Estimation of location uncertainty for scale invariant feature points*, BMVC 2009). The finest
+/// keypoints of an image that was not doubled have a scale of 2 pixels, and so a standard deviation of one.
+const SIGMA_OF_SCALE: f32 = 0.5;
 
 fn options(config: &Config) -> Value {
     let poses: Vec<Value> = config
@@ -48,9 +52,8 @@ fn options(config: &Config) -> Value {
 
 fn work(work: &Work<'_>) -> Result<Outcome> {
     let list = ImageList::load(work)?;
-    let (starts, _) = interior::starts(work.config, &list)?;
     let mut warnings = Vec::new();
-    let input = input(work, &list, &starts, &mut warnings)?;
+    let (input, starts) = input(work, &list, &mut warnings)?;
     work.progress.begin("orienting", 0);
     let orientation = match mapping::orient(&input, &options_of(work.config)) {
         Ok(orientation) => orientation,
@@ -91,31 +94,32 @@ fn options_of(config: &Config) -> OrientOptions {
     }
 }
 
-fn input(work: &Work<'_>, list: &ImageList, starts: &[Start], warnings: &mut Vec<Warning>) -> Result<MapInput> {
+fn input(work: &Work<'_>, list: &ImageList, warnings: &mut Vec<Warning>) -> Result<(MapInput, Vec<Start>)> {
     // Descriptors are dropped image by image: all of them would not fit.
-    let positions: Vec<Result<Positions>> =
-        list.images.par_iter().map(|image| Ok(positions(&features::load(work, list, image)?))).collect();
-    let mut input = MapInput {
-        cameras: starts.iter().map(|s| CameraInput { camera: s.camera, known: s.is_known(), fixed: s.fixed }).collect(),
-        pairs: matching::load(work, list)?,
+    let found: Vec<(Vec<Keypoint>, Vec<[u8; 3]>)> = list
+        .images
+        .par_iter()
+        .map(|image| {
+            let stored = features::load(work, list, image)?;
+            Ok((stored.features.keypoints, stored.colours))
+        })
+        .collect::<Result<_>>()?;
+    let (keypoints, colours): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    let pairs = matching::load(work, list)?;
+    let (mut starts, _) = interior::starts(work.config, list)?;
+    interior::add_alternatives(&mut starts, list, &keypoints, &pairs, work.config)?;
+    let image = |image: &ImageEntry| ImageInput { name: image.name.clone(), camera: CameraId::new(image.camera), exposure: image.exposure };
+    let input = MapInput {
+        cameras: starts.iter().map(|s| CameraInput { camera: s.camera, fixed: s.fixed, alternatives: s.alternatives.clone() }).collect(),
+        images: list.images.iter().map(image).collect(),
+        keypoints: keypoints.iter().map(|some| some.iter().map(|k| [k.x, k.y]).collect()).collect(),
+        sigmas_px: keypoints.iter().map(|some| some.iter().map(|k| SIGMA_OF_SCALE * k.scale).collect()).collect(),
+        colours,
+        pairs,
         rig: rig(work.config),
-        ..MapInput::default()
+        scale_bars: work.config.scale_bars.iter().map(|bar| scale_bar(bar, list, warnings)).collect(),
     };
-    for (image, positions) in list.images.iter().zip(positions) {
-        let (keypoints, colours) = positions?;
-        input.images.push(ImageInput { name: image.name.clone(), camera: CameraId::new(image.camera), exposure: image.exposure });
-        input.keypoints.push(keypoints);
-        input.colours.push(colours);
-    }
-    input.scale_bars = work.config.scale_bars.iter().map(|bar| scale_bar(bar, list, warnings)).collect();
-    Ok(input)
-}
-
-/// Keypoints and colours of an image.
-type Positions = (Vec<[f32; 2]>, Vec<[u8; 3]>);
-
-fn positions(stored: &StoredFeatures) -> Positions {
-    (stored.features.keypoints.iter().map(|k| [k.x, k.y]).collect(), stored.colours.clone())
+    Ok((input, starts))
 }
 
 fn rig(config: &Config) -> RigInput {

@@ -9,4 +9,6 @@ mod verify;
 pub use error::FeatureError;
 pub use matching::{MatchOptions, match_descriptors};
 pub use sift::{SiftOptions, extract};
-pub use verify::{ImageForPair, PairVerdict, Rejection, VerifyOptions, verify_pair};
+pub use verify::{
+    ImageForPair, InteriorEstimate, PairForInterior, PairVerdict, Rejection, VerifyOptions, interior_from_pairs, verify_pair,
+};

@@ -10,6 +10,9 @@ use scene::camera::{MAX_CAMERA_PARAMS, ParamKind};
 use scene::{FrameId, ImageId, PointId};
 use solve::adjust::{AdjustOptions, AdjustSummary, CameraBlock, ImageObservation, Loss, PointBlock, PoseBlock, PosePrior, Problem, adjust};
 
+/// Standard deviation of the end of a scale bar that somebody or a detector picked in an image, pixels.
+const PICK_SIGMA_PX: f64 = 1.0;
+
 /// How hard an adjustment of the whole model tries.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
@@ -95,9 +98,7 @@ fn build(model: &Model, scope: &Scope, options: &OrientOptions) -> (Problem, Pro
         let index = points.len() as u32;
         points.push(PointBlock { xyz: point.xyz, free: true });
         for &o in &point.track {
-            if let Some(observation) = observe(model, &map, o.image, index, model.pixel(o)) {
-                observations.push(observation);
-            }
+            observations.extend(observe(model, &map, o.image, index, model.pixel(o), model.sigma_px(o)));
         }
     }
     let mut problem = Problem { cameras, sensors, frames, points, observations, baselines: Vec::new(), scale_bars: Vec::new() };
@@ -105,7 +106,7 @@ fn build(model: &Model, scope: &Scope, options: &OrientOptions) -> (Problem, Pro
         lengths.add_to(
             &mut problem,
             |image| sensor_of(model, &map, image),
-            |image, point, pixel| observe(model, &map, image, point, pixel),
+            |image, point, pixel| observe(model, &map, image, point, pixel, PICK_SIGMA_PX),
         );
     }
     (problem, map)
@@ -119,9 +120,9 @@ fn sensor_of(model: &Model, map: &ProblemMap, image: ImageId) -> Option<(u32, u3
     Some((map.frames[frame.index()]?, map.first_sensor[rig.index()] + place as u32))
 }
 
-fn observe(model: &Model, map: &ProblemMap, image: ImageId, point: u32, pixel: Vector2<f64>) -> Option<ImageObservation> {
+fn observe(model: &Model, map: &ProblemMap, image: ImageId, point: u32, pixel: Vector2<f64>, sigma_px: f64) -> Option<ImageObservation> {
     let (frame, sensor) = sensor_of(model, map, image)?;
-    Some(ImageObservation { frame, sensor, camera: model.images[image.index()].camera.0, point, pixel, sigma_px: 1.0 })
+    Some(ImageObservation { frame, sensor, camera: model.images[image.index()].camera.0, point, pixel, sigma_px })
 }
 
 fn camera_block(model: &Model, camera: usize, oriented: &[ImageId], calibration: bool, options: &OrientOptions) -> CameraBlock {

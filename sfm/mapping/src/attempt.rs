@@ -18,6 +18,7 @@ pub(crate) fn best_model<'a>(
     allowed: &[bool],
     options: &OrientOptions,
 ) -> Result<Option<(Model<'a>, Tries)>, MapError> {
+    let options = &options.growing();
     let reachable = (0..empty.frames.len())
         .filter(|&f| allowed[f] && empty.frame_images[f].iter().any(|&i| empty.graph.link_count(i) >= options.register_min_inliers))
         .count();
@@ -32,7 +33,7 @@ pub(crate) fn best_model<'a>(
         if !begin(&mut model, start, options)? {
             continue;
         }
-        let tries = grow(&mut model, allowed, options)?;
+        let tries = grow(&mut model, allowed, usize::MAX, options)?;
         grown += 1;
         let size = |m: &Model| (m.oriented_frames().len(), m.observation_count());
         let enough = model.oriented_frames().len() as f64 >= GOOD_SHARE * reachable as f64;

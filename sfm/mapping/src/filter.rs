@@ -19,7 +19,7 @@ pub(crate) fn filter_points(model: &mut Model, options: &OrientOptions) -> usize
             .track
             .iter()
             .copied()
-            .filter(|&o| model.reprojection_error(&xyz, o).is_none_or(|e| e.is_nan() || e > options.max_error_px))
+            .filter(|&o| model.reprojection_error(&xyz, o).is_none_or(|e| !model.is_inlier(o, e, options.max_error_px)))
             .collect();
         for o in bad {
             model.remove_observation(o);

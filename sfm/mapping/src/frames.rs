@@ -47,12 +47,15 @@ impl Layout {
     }
 }
 
-/// Poses in the rig of all cameras, where the input gives them all (camera 0 is the reference).
+/// Pose of a camera in the rig, where the input gives it (camera 0 is the reference).
+pub(crate) fn given_pose(input: &MapInput, camera: usize) -> Option<Rigid3> {
+    if camera == 0 { Some(Rigid3::identity()) } else { input.rig.poses.get(camera).copied().flatten().map(|p| p.cam_from_rig) }
+}
+
+/// Poses in the rig of all cameras, where the input gives them all.
 pub(crate) fn known_rig(input: &MapInput) -> Option<Vec<Rigid3>> {
     if input.rig.mode != RigMode::Rigid || input.cameras.len() < 2 {
         return None;
     }
-    (0..input.cameras.len())
-        .map(|c| if c == 0 { Some(Rigid3::identity()) } else { input.rig.poses.get(c).copied().flatten().map(|p| p.cam_from_rig) })
-        .collect()
+    (0..input.cameras.len()).map(|c| given_pose(input, c)).collect()
 }

@@ -22,11 +22,35 @@ const MAX_ROUNDS: usize = 5;
 const SETTLED_SHARE: f64 = 5e-4;
 /// A frame that sees fewer points loses its pose.
 const MIN_FRAME_OBSERVATIONS: usize = 12;
-/// Times that a frame may fail before it is left out.
+/// Tries of a frame before it has to wait for a model that it sees more of. A frame that was registered and lost its pose
+/// again has had its try, too: else it could come and go forever.
 const MAX_TRIES: u8 = 3;
+/// A frame that sees this many times the points that it saw at any try before may be tried once more.
+const RETRY_GROWTH: f64 = 1.2;
 
-/// How the last try of each frame went.
-pub(crate) type Tries = Vec<(u8, Option<Registration>)>;
+/// The tries of each frame.
+pub(crate) type Tries = Vec<Try>;
+
+/// How often a frame was tried, and how the last try went.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Try {
+    count: u8,
+    /// Most points that it saw at a try.
+    seen: usize,
+    pub outcome: Option<Registration>,
+}
+
+impl Try {
+    /// Whether the frame, which now sees `seen` points, may be tried.
+    fn begin(&mut self, seen: usize) -> bool {
+        let allowed = self.count < MAX_TRIES || seen as f64 >= RETRY_GROWTH * self.seen as f64;
+        if allowed {
+            self.count = self.count.saturating_add(1);
+            self.seen = self.seen.max(seen);
+        }
+        allowed
+    }
+}
 
 /// Poses the first frames, makes points and adjusts. Returns whether enough points stand.
 pub(crate) fn begin(model: &mut Model, start: &Start, options: &OrientOptions) -> Result<bool, MapError> {
@@ -42,12 +66,15 @@ pub(crate) fn begin(model: &mut Model, start: &Start, options: &OrientOptions) -
     Ok(model.point_count() >= options.initial_min_inliers / 2)
 }
 
-/// Registers all frames that can be, triangulating and adjusting on the way.
-pub(crate) fn grow(model: &mut Model, allowed: &[bool], options: &OrientOptions) -> Result<Tries, MapError> {
-    let mut tries: Tries = vec![(0, None); model.frames.len()];
+/// Registers frames as long as there are any that can be and the model has fewer than `max_frames`, triangulating and adjusting on the
+/// way; the last step is an adjustment of the whole.
+pub(crate) fn grow(model: &mut Model, allowed: &[bool], max_frames: usize, options: &OrientOptions) -> Result<Tries, MapError> {
+    let mut tries: Tries = vec![Try::default(); model.frames.len()];
     let mut adjusted = Size::of(model);
     loop {
-        let Some(frame) = register_next(model, allowed, &mut tries, options) else {
+        let is_full = model.oriented_frames().len() >= max_frames;
+        let next = if is_full { None } else { register_next(model, allowed, &mut tries, options) };
+        let Some(frame) = next else {
             if adjusted == Size::of(model) {
                 return Ok(tries);
             }
@@ -69,16 +96,15 @@ pub(crate) fn grow(model: &mut Model, allowed: &[bool], options: &OrientOptions)
 
 fn register_next(model: &mut Model, allowed: &[bool], tries: &mut Tries, options: &OrientOptions) -> Option<FrameId> {
     for frame in candidates(model, allowed, options) {
-        let (failures, outcome) = &mut tries[frame.index()];
-        if *failures >= MAX_TRIES {
+        let seen = model.frame_images[frame.index()].iter().map(|&i| model.visibility(i).count()).sum();
+        if !tries[frame.index()].begin(seen) {
             continue;
         }
         let registration = register_frame(model, frame, options);
-        *outcome = Some(registration);
+        tries[frame.index()].outcome = Some(registration);
         if registration == Registration::Done {
             return Some(frame);
         }
-        *failures += 1;
     }
     None
 }
@@ -118,6 +144,8 @@ pub(crate) fn finish(model: &mut Model, lengths: Option<&Lengths>, options: &Ori
     refine(model, lengths, Effort { loss: options.loss, max_iterations: 50, function_tolerance: 1e-6 }, options)?;
     let summary = adjust_all(model, lengths, Effort { loss: options.loss, max_iterations: 100, function_tolerance: 1e-10 }, options)?;
     filter_points(model, options);
+    // What goes with one frame may have been what held another.
+    while filter_frames(model, MIN_FRAME_OBSERVATIONS) > 0 {}
     Ok(summary)
 }
 

@@ -11,6 +11,9 @@ pub struct MapInput {
     pub images: Vec<ImageInput>,
     /// Keypoints of each image, pixels.
     pub keypoints: Vec<Vec<[f32; 2]>>,
+    /// Standard deviation of each keypoint along each image axis, pixels: the weight of its observation. An empty list for an image whose
+    /// keypoints all have 1.
+    pub sigmas_px: Vec<Vec<f32>>,
     /// Colour of each keypoint, or an empty list for an image whose colours are unknown.
     pub colours: Vec<Vec<[u8; 3]>>,
     /// Verified pairs.
@@ -26,10 +29,10 @@ pub struct MapInput {
 pub struct CameraInput {
     /// Start values.
     pub camera: Camera,
-    /// The values come from a calibration or from EXIF, not from a guess.
-    pub known: bool,
     /// The values are not refined.
     pub fixed: bool,
+    /// Other start values for a camera of which little is known: the one with which a small model fits best is taken.
+    pub alternatives: Vec<Camera>,
 }
 
 /// An image.

@@ -4,7 +4,7 @@ use crate::input::{ImagePick, RigMode, ScaleBarInput};
 use crate::model::Model;
 use crate::summary::{BaselineReport, ScaleBarReport};
 use nalgebra::{Vector2, Vector3};
-use scene::{ImageId, Similarity3};
+use scene::{ImageId, Scale, Similarity3};
 use solve::adjust::{Baseline, ImageObservation, PointBlock, Problem, ScaleBar};
 use solve::triangulate::{View, triangulate};
 use std::collections::BTreeMap;
@@ -159,8 +159,11 @@ pub(crate) fn rescale(model: &mut Model, scale: f64) {
     }
 }
 
-/// Given and found baselines.
-pub(crate) fn report_baselines(model: &Model) -> Vec<BaselineReport> {
+/// Given and found baselines; none where the world has no metres.
+pub(crate) fn report_baselines(model: &Model, scale: Scale) -> Vec<BaselineReport> {
+    if scale == Scale::Arbitrary {
+        return Vec::new();
+    }
     let rig = &model.input.rig;
     rig.baselines
         .iter()
@@ -180,12 +183,12 @@ pub(crate) fn report_baselines(model: &Model) -> Vec<BaselineReport> {
 }
 
 /// Given and found scale bars.
-pub(crate) fn report_bars(model: &Model) -> Vec<ScaleBarReport> {
+pub(crate) fn report_bars(model: &Model, scale: Scale) -> Vec<ScaleBarReport> {
     let bars = model.input.scale_bars.iter().enumerate();
     bars.map(|(index, bar)| ScaleBarReport {
         index,
         given_m: bar.length_m,
-        found_m: bar_ends(model, bar).map(|[a, b]| (a - b).norm()),
+        found_m: bar_ends(model, bar).filter(|_| scale == Scale::Metric).map(|[a, b]| (a - b).norm()),
         check: bar.check,
     })
     .collect()

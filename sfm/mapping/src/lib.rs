@@ -9,6 +9,8 @@
 
 mod adjustment;
 mod attempt;
+mod check;
+mod contradiction;
 mod error;
 mod filter;
 mod frames;
@@ -16,6 +18,7 @@ mod graph;
 mod incremental;
 mod initial;
 mod input;
+mod interior;
 mod lengths;
 mod model;
 mod options;

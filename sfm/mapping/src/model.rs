@@ -117,6 +117,16 @@ impl<'a> Model<'a> {
         Vector2::new(f64::from(x), f64::from(y))
     }
 
+    /// Standard deviation of a keypoint, pixels.
+    pub(crate) fn sigma_px(&self, o: Observation) -> f64 {
+        self.input.sigmas_px.get(o.image.index()).and_then(|s| s.get(o.keypoint.index())).map_or(1.0, |&s| f64::from(s))
+    }
+
+    /// Whether a reprojection error is small enough to be one: `max_error_px`, and less for keypoints better than a pixel. NaN is not.
+    pub(crate) fn is_inlier(&self, o: Observation, error_px: f64, max_error_px: f64) -> bool {
+        error_px <= max_error_px * self.sigma_px(o).min(1.0)
+    }
+
     /// Every keypoint of an image.
     pub(crate) fn keypoints_of(&self, image: ImageId) -> impl Iterator<Item = Observation> + use<> {
         (0..self.point_of[image.index()].len()).map(move |k| Observation { image, keypoint: KeypointIndex::new(k) })

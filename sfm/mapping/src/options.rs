@@ -15,7 +15,8 @@ pub struct OrientOptions {
     pub register_min_inliers: usize,
     /// Share of inliers that a new frame needs.
     pub register_min_inlier_share: f64,
-    /// Largest reprojection error of an observation that is kept, pixels.
+    /// Largest reprojection error of an observation that is kept, pixels, and twice as much while the model grows; of a keypoint with a standard deviation below a pixel, this many
+    /// standard deviations.
     pub max_error_px: f64,
     /// Smallest intersection angle of a point that is kept, degrees.
     pub min_angle_deg: f64,
@@ -31,6 +32,13 @@ pub struct OrientOptions {
     pub seed: u64,
 }
 
+impl OrientOptions {
+    /// Options while frames are still missing: interior orientation and poses are not what they will be.
+    pub(crate) fn growing(&self) -> Self {
+        Self { max_error_px: 2.0 * self.max_error_px, ..self.clone() }
+    }
+}
+
 impl Default for OrientOptions {
     fn default() -> Self {
         Self {
@@ -39,7 +47,7 @@ impl Default for OrientOptions {
             register_max_error_px: 12.0,
             register_min_inliers: 30,
             register_min_inlier_share: 0.25,
-            max_error_px: 4.0,
+            max_error_px: 2.0,
             min_angle_deg: 1.5,
             loss: Loss::Trivial,
             refine_principal_point: false,

@@ -1,19 +1,20 @@
 //! The way from verified pairs to models.
 
 use crate::attempt::best_model;
+use crate::contradiction;
 use crate::error::MapError;
-use crate::frames::{Layout, known_rig};
+use crate::frames::{Layout, given_pose, known_rig};
 use crate::graph::CorrespondenceGraph;
 use crate::incremental::{Tries, finish};
 use crate::initial::{from_exposures, from_pairs};
 use crate::input::{MapInput, RigMode};
+use crate::interior::{best_interior, is_plausible};
 use crate::lengths::{Lengths, report_bars, report_baselines, rescale};
 use crate::model::Model;
 use crate::options::OrientOptions;
 use crate::register::Registration;
 use crate::rig::{solve_rig, with_rig};
 use crate::summary::{LeftOut, OrientSummary, Orientation};
-use nalgebra::Vector2;
 use scene::{Observation, Point, Reconstruction, Rigid3, Scale};
 use solve::adjust::AdjustSummary;
 
@@ -35,16 +36,27 @@ pub fn orient(input: &MapInput, options: &OrientOptions) -> Result<Orientation, 
     let graph = CorrespondenceGraph::new(&counts, &input.pairs);
     let mut notes = Vec::new();
     let mut done = first_model(input, &graph, options, &mut notes)?;
-    let baselines = report_baselines(&done.model);
-    let scale_bars = report_bars(&done.model);
+    for (c, camera) in done.model.cameras.iter().enumerate().filter(|(c, _)| !input.cameras[*c].fixed) {
+        if !is_plausible(camera) {
+            notes.push(format!(
+                "the interior orientation found for camera {c} is not that of a lens ({} {:?}): do not trust the model, give a calibration",
+                camera.model().name(),
+                camera.params()
+            ));
+        }
+    }
+    let baselines = report_baselines(&done.model, done.scale);
+    let scale_bars = report_bars(&done.model, done.scale);
+    notes.extend(contradiction::note(&done.model, options));
     let mut models = vec![reconstruction(&done.model, done.scale)];
     let mut taken: Vec<bool> = (0..input.images.len()).map(|i| done.model.is_oriented(scene::ImageId::new(i))).collect();
-    let left_out_reasons = reasons(&done.model, &done.tries);
+    let left_out_reasons = reasons(&done.model, &done.outcomes);
     for _ in 0..MAX_FURTHER_MODELS {
-        let Some(further) = further_model(input, &graph, &done.model, &taken, options)? else { break };
+        let Some(further) = further_model(input, &graph, &done, &taken, options)? else { break };
         for (i, taken) in taken.iter_mut().enumerate() {
             *taken |= further.model.is_oriented(scene::ImageId::new(i));
         }
+        notes.extend(contradiction::note(&further.model, options));
         models.push(reconstruction(&further.model, further.scale));
         done.model.cameras.clone_from(&further.model.cameras);
     }
@@ -58,13 +70,15 @@ pub fn orient(input: &MapInput, options: &OrientOptions) -> Result<Orientation, 
 
 struct Done<'a> {
     model: Model<'a>,
-    tries: Tries,
+    /// How the last try of each image's frame went.
+    outcomes: Vec<Option<Registration>>,
     adjustment: AdjustSummary,
     scale: Scale,
 }
 
-fn cameras(input: &MapInput) -> Vec<scene::Camera> {
-    input.cameras.iter().map(|c| c.camera).collect()
+/// How the last try of each image's frame went.
+fn by_image(model: &Model, tries: &Tries) -> Vec<Option<Registration>> {
+    model.images.iter().map(|image| tries[image.frame.index()].outcome).collect()
 }
 
 fn first_model<'a>(
@@ -73,37 +87,35 @@ fn first_model<'a>(
     options: &OrientOptions,
     notes: &mut Vec<String>,
 ) -> Result<Done<'a>, MapError> {
+    let cameras = input.cameras.iter().map(|c| c.camera).collect();
+    let layout = Layout::independent(input);
+    let mut independent = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
+    let any = vec![true; independent.frames.len()];
+    independent.cameras = best_interior(&independent, &any, options)?;
     if let Some(cam_from_rig) = known_rig(input) {
-        let layout = Layout::rigid(input, &cam_from_rig);
-        let empty = Model::new(input, graph, cameras(input), layout.rigs, layout.frames, layout.images);
-        let allowed = vec![true; empty.frames.len()];
-        if let Some((mut model, tries)) = best_model(&empty, &from_exposures(&empty, &allowed, options), &allowed, options)? {
-            let lengths = Lengths::of(&model);
-            let adjustment = finish(&mut model, (!lengths.is_empty()).then_some(&lengths), options)?;
-            return Ok(Done { model, tries, adjustment, scale: Scale::Metric });
+        let taken = vec![false; input.images.len()];
+        if let Some(done) = on_rig(input, graph, (independent.cameras.clone(), &cam_from_rig, Scale::Metric), &taken, options)? {
+            return Ok(done);
         }
         notes
             .push("no exposure has enough matches between its cameras: images were oriented one by one, and then joined by the rig".into());
     }
-    let layout = Layout::independent(input);
-    let empty = Model::new(input, graph, cameras(input), layout.rigs, layout.frames, layout.images);
-    let allowed = vec![true; empty.frames.len()];
-    let starts = from_pairs(&empty, &allowed, options);
+    let starts = from_pairs(&independent, &any, options);
     let none = MapError::NoInitialPair { candidates: starts.tried, best_inliers: starts.best_inliers, needed: options.initial_min_inliers };
-    let (mut model, tries) = best_model(&empty, &starts, &allowed, options)?.ok_or(none)?;
+    let Some((mut model, tries)) = best_model(&independent, &starts, &any, options)? else { return Err(none) };
+    let outcomes = by_image(&model, &tries);
+    let mut scale = Scale::Arbitrary;
     if input.rig.mode == RigMode::Rigid && input.cameras.len() > 1 {
         finish(&mut model, None, options)?;
         match solve_rig(&model) {
             Ok(solved) => {
-                let (rig, scale) = scaled_rig(input, solved);
-                model = with_rig(&model, &rig);
-                if let Some(scale) = scale {
-                    rescale(&mut model, scale);
-                    for (sensor, pose) in
-                        model.rigs[0].sensors.iter_mut().zip(known_rig(input).unwrap_or(rig.iter().map(|p| scaled(p, scale)).collect()))
-                    {
-                        sensor.cam_from_rig = pose;
+                model = with_rig(&model, &solved);
+                if let Some(factor) = metres_per_unit(input, &solved) {
+                    rescale(&mut model, factor);
+                    for (c, sensor) in model.rigs[0].sensors.iter_mut().enumerate() {
+                        sensor.cam_from_rig = given_pose(input, c).unwrap_or(sensor.cam_from_rig);
                     }
+                    scale = Scale::Metric;
                 }
             }
             Err(missing) => notes.push(format!(
@@ -112,25 +124,52 @@ fn first_model<'a>(
             )),
         }
     }
-    finish_metric(model, tries, options)
+    let done = finish_metric(model, outcomes, scale, options)?;
+    // What grew from a wrong start may fall to nothing.
+    if done.model.oriented_frames().is_empty() { Err(none) } else { Ok(done) }
 }
 
-fn scaled(pose: &Rigid3, scale: f64) -> Rigid3 {
-    Rigid3::new(pose.rotation, pose.translation * scale)
+/// A model of the images that are not taken, one pose an exposure, in the unit of the rig; `None` when no exposure has
+/// enough matches between its cameras.
+fn on_rig<'a>(
+    input: &'a MapInput,
+    graph: &'a CorrespondenceGraph,
+    (cameras, cam_from_rig, scale): (Vec<scene::Camera>, &[Rigid3], Scale),
+    taken: &[bool],
+    options: &OrientOptions,
+) -> Result<Option<Done<'a>>, MapError> {
+    let layout = Layout::rigid(input, cam_from_rig);
+    let empty = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
+    let allowed: Vec<bool> = empty.frame_images.iter().map(|images| images.iter().all(|i| !taken[i.index()])).collect();
+    let Some((mut model, tries)) = best_model(&empty, &from_exposures(&empty, &allowed, options), &allowed, options)? else {
+        return Ok(None);
+    };
+    let outcomes = by_image(&model, &tries);
+    let lengths = Lengths::of(&model);
+    let used = (scale == Scale::Metric && !lengths.is_empty()).then_some(&lengths);
+    let adjustment = finish(&mut model, used, options)?;
+    Ok((!model.oriented_frames().is_empty()).then_some(Done { model, outcomes, adjustment, scale }))
 }
 
-/// The rig to use, in units of the model, and metres in one of these units where the input knows poses in the rig.
-fn scaled_rig(input: &MapInput, solved: Vec<Rigid3>) -> (Vec<Rigid3>, Option<f64>) {
-    let Some(known) = known_rig(input) else { return (solved, None) };
-    let length = |poses: &[Rigid3]| poses.iter().map(|p| p.translation.norm()).sum::<f64>();
-    let scale = length(&known) / length(&solved);
-    if scale.is_finite() && scale > 0.0 { (solved, Some(scale)) } else { (solved, None) }
+/// Metres in one unit of the solved rig, from the cameras whose pose in the rig is given.
+fn metres_per_unit(input: &MapInput, solved: &[Rigid3]) -> Option<f64> {
+    let (mut given_m, mut found) = (0.0, 0.0);
+    for (c, solved) in solved.iter().enumerate() {
+        if let Some(given) = given_pose(input, c) {
+            given_m += given.translation.norm();
+            found += solved.translation.norm();
+        }
+    }
+    Some(given_m / found).filter(|s| s.is_finite() && *s > 0.0)
 }
 
 /// Brings a model to metres where lengths are known, and adjusts it for the last time.
-fn finish_metric<'a>(mut model: Model<'a>, tries: Tries, options: &OrientOptions) -> Result<Done<'a>, MapError> {
-    let known_metric = model.rigs.len() == 1 && known_rig(model.input).is_some() && model.cameras.len() > 1;
-    let mut scale = if known_metric { Scale::Metric } else { Scale::Arbitrary };
+fn finish_metric<'a>(
+    mut model: Model<'a>,
+    outcomes: Vec<Option<Registration>>,
+    mut scale: Scale,
+    options: &OrientOptions,
+) -> Result<Done<'a>, MapError> {
     let lengths = Lengths::of(&model);
     if scale == Scale::Arbitrary
         && let Some(factor) = lengths.scale(&model)
@@ -142,39 +181,45 @@ fn finish_metric<'a>(mut model: Model<'a>, tries: Tries, options: &OrientOptions
     let lengths = Lengths::of(&model);
     let used = (scale == Scale::Metric && !lengths.is_empty()).then_some(&lengths);
     let adjustment = finish(&mut model, used, options)?;
-    Ok(Done { model, tries, adjustment, scale })
+    Ok(Done { model, outcomes, adjustment, scale })
 }
 
 /// Another model from the images that are in none yet.
 fn further_model<'a>(
     input: &'a MapInput,
     graph: &'a CorrespondenceGraph,
-    first: &Model,
+    first: &Done,
     taken: &[bool],
     options: &OrientOptions,
 ) -> Result<Option<Done<'a>>, MapError> {
-    let layout = Layout::independent(input);
-    // Interior orientation that the first model found is the best that is known.
-    let empty = Model::new(input, graph, first.cameras.clone(), layout.rigs, layout.frames, layout.images);
     let allowed: Vec<bool> = taken.iter().map(|t| !t).collect();
     if allowed.iter().filter(|a| **a).count() < options.min_model_frames {
         return Ok(None);
     }
+    let enough = |done: &Done| done.model.oriented_frames().len() >= options.min_model_frames.max(1);
+    // Interior orientation and rig that the first model found are the best that is known.
+    let cameras = first.model.cameras.clone();
+    if input.rig.mode == RigMode::Rigid && input.cameras.len() > 1 && first.model.rigs.len() == 1 {
+        let cam_from_rig: Vec<Rigid3> = first.model.rigs[0].sensors.iter().map(|s| s.cam_from_rig).collect();
+        if let Some(done) = on_rig(input, graph, (cameras.clone(), &cam_from_rig, first.scale), taken, options)?.filter(enough) {
+            return Ok(Some(done));
+        }
+    }
+    let layout = Layout::independent(input);
+    let empty = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
     let starts = from_pairs(&empty, &allowed, options);
     let Some((model, tries)) = best_model(&empty, &starts, &allowed, options)? else { return Ok(None) };
-    let done = finish_metric(model, tries, options)?;
-    Ok((done.model.oriented_frames().len() >= options.min_model_frames).then_some(done))
+    let outcomes = by_image(&model, &tries);
+    Ok(Some(finish_metric(model, outcomes, Scale::Arbitrary, options)?).filter(enough))
 }
 
 /// Why each image of the first model has no pose.
-fn reasons(model: &Model, tries: &Tries) -> Vec<String> {
+fn reasons(model: &Model, outcomes: &[Option<Registration>]) -> Vec<String> {
     (0..model.images.len())
         .map(|i| {
             let image = scene::ImageId::new(i);
-            // A rig that was solved for has other frames than the attempt had.
-            let outcome = tries.get(model.images[i].frame.index()).and_then(|(_, outcome)| *outcome);
             let visible = model.visibility(image).count();
-            match outcome {
+            match outcomes[i] {
                 _ if model.input.keypoints[i].is_empty() => "no keypoints".into(),
                 _ if model.graph.link_count(image) == 0 => "no verified match with any other image".into(),
                 Some(Registration::Failed { inliers, correspondences }) => {
@@ -219,50 +264,4 @@ fn colour(model: &Model, track: &[Observation]) -> [u8; 3] {
         let sum: usize = known.iter().map(|colour| usize::from(colour[c])).sum();
         ((sum + known.len() / 2) / known.len()) as u8
     })
-}
-
-impl MapInput {
-    /// Refuses input that contradicts itself.
-    fn check(&self) -> Result<(), MapError> {
-        let bad = |what: String| Err(MapError::Inconsistent(what));
-        if self.keypoints.len() != self.images.len() {
-            return bad(format!("{} images, but keypoints of {}", self.images.len(), self.keypoints.len()));
-        }
-        let mut seen = std::collections::BTreeSet::new();
-        for image in &self.images {
-            if image.camera.index() >= self.cameras.len() {
-                return bad(format!("image {} was taken by camera {}, which does not exist", image.name, image.camera));
-            }
-            if self.rig.mode != RigMode::None && !seen.insert((image.camera, image.exposure)) {
-                return bad(format!("image {} is the second of camera {} in exposure {}", image.name, image.camera, image.exposure));
-            }
-        }
-        for pair in &self.pairs {
-            let (a, b) = (pair.images.0.index(), pair.images.1.index());
-            if a == b || a >= self.images.len() || b >= self.images.len() {
-                return bad(format!("a pair of images {a} and {b}"));
-            }
-            let (na, nb) = (self.keypoints[a].len(), self.keypoints[b].len());
-            if pair.matches.iter().any(|(ka, kb)| ka.index() >= na || kb.index() >= nb) {
-                return bad(format!("a match between images {a} and {b} names a keypoint that does not exist"));
-            }
-        }
-        for keypoints in &self.keypoints {
-            if keypoints.iter().any(|k| !Vector2::from(*k).iter().all(|v| v.is_finite())) {
-                return bad("a keypoint is not a number".into());
-            }
-        }
-        for baseline in &self.rig.baselines {
-            if baseline.cameras.0.index().max(baseline.cameras.1.index()) >= self.cameras.len() || baseline.cameras.0 == baseline.cameras.1
-            {
-                return bad(format!("a baseline between cameras {} and {}", baseline.cameras.0, baseline.cameras.1));
-            }
-        }
-        for pick in self.scale_bars.iter().flat_map(|bar| bar.ends.iter().flatten()) {
-            if pick.image.index() >= self.images.len() {
-                return bad(format!("a scale bar is picked in image {}, which does not exist", pick.image));
-            }
-        }
-        Ok(())
-    }
 }

@@ -19,7 +19,7 @@ pub struct OrientSummary {
     pub adjustment: AdjustSummary,
     /// Images in no model, and why.
     pub left_out: Vec<LeftOut>,
-    /// Known baselines and what was found.
+    /// Known baselines and what was found; empty where the first model is not metric.
     pub baselines: Vec<BaselineReport>,
     /// Known lengths in the scene and what was found.
     pub scale_bars: Vec<ScaleBarReport>,
@@ -60,7 +60,8 @@ pub struct ScaleBarReport {
     pub index: usize,
     /// Given length, metres.
     pub given_m: f64,
-    /// Found length, metres; `None` when an end is picked in fewer than two oriented images.
+    /// Found length, metres; `None` when an end is picked in fewer than two oriented images, or the model is
+    /// not metric.
     pub found_m: Option<f64>,
     /// Took no part in the adjustment.
     pub check: bool,

@@ -33,7 +33,7 @@ fn continue_track(model: &mut Model, o: Observation, options: &OrientOptions) ->
             continue;
         }
         if let Some(error) = model.reprojection_error(&point.xyz, o)
-            && error <= options.max_error_px
+            && model.is_inlier(o, error, options.max_error_px)
             && best.is_none_or(|(least, _)| error < least)
         {
             best = Some((error, id));
@@ -94,7 +94,7 @@ pub(crate) fn complete_tracks(model: &mut Model, options: &OrientOptions) -> usi
                 for &link in graph.of(o) {
                     if model.point_of(link).is_none()
                         && model.point(id).is_some_and(|p| !p.sees(link.image))
-                        && model.reprojection_error(&xyz, link).is_some_and(|e| e <= options.max_error_px)
+                        && model.reprojection_error(&xyz, link).is_some_and(|e| model.is_inlier(link, e, options.max_error_px))
                     {
                         model.add_observation(id, link);
                         added.push(link);
@@ -159,7 +159,7 @@ fn merge_partner(model: &Model, id: PointId, options: &OrientOptions, tried: &mu
 fn joined_track(model: &Model, xyz: &Vector3<f64>, a: &[Observation], b: &[Observation], max_error_px: f64) -> Option<Vec<Observation>> {
     let mut track: Vec<(Observation, f64)> = Vec::with_capacity(a.len() + b.len());
     for &o in a.iter().chain(b) {
-        let error = model.reprojection_error(xyz, o).filter(|&e| e <= max_error_px)?;
+        let error = model.reprojection_error(xyz, o).filter(|&e| model.is_inlier(o, e, max_error_px))?;
         match track.iter_mut().find(|(other, _)| other.image == o.image) {
             Some(known) if known.1 > error => *known = (o, error),
             Some(_) => {}

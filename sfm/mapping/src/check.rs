@@ -1,0 +1,85 @@
+//! Refuses input that contradicts itself.
+
+use crate::error::MapError;
+use crate::input::{MapInput, RigMode};
+use nalgebra::Vector2;
+use scene::Rigid3;
+
+fn are_positive(values: &[f64]) -> bool {
+    values.iter().all(|v| v.is_finite() && *v > 0.0)
+}
+
+impl MapInput {
+    /// Refuses input that contradicts itself.
+    pub(crate) fn check(&self) -> Result<(), MapError> {
+        let bad = |what: String| Err(MapError::Inconsistent(what));
+        if self.keypoints.len() != self.images.len() {
+            return bad(format!("{} images, but keypoints of {}", self.images.len(), self.keypoints.len()));
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        for image in &self.images {
+            if image.camera.index() >= self.cameras.len() {
+                return bad(format!("image {} was taken by camera {}, which does not exist", image.name, image.camera));
+            }
+            if self.rig.mode != RigMode::None && !seen.insert((image.camera, image.exposure)) {
+                return bad(format!("image {} is the second of camera {} in exposure {}", image.name, image.camera, image.exposure));
+            }
+        }
+        for pair in &self.pairs {
+            let (a, b) = (pair.images.0.index(), pair.images.1.index());
+            if a == b || a >= self.images.len() || b >= self.images.len() {
+                return bad(format!("a pair of images {a} and {b}"));
+            }
+            let (na, nb) = (self.keypoints[a].len(), self.keypoints[b].len());
+            if pair.matches.iter().any(|(ka, kb)| ka.index() >= na || kb.index() >= nb) {
+                return bad(format!("a match between images {a} and {b} names a keypoint that does not exist"));
+            }
+        }
+        for keypoints in &self.keypoints {
+            if keypoints.iter().any(|k| !Vector2::from(*k).iter().all(|v| v.is_finite())) {
+                return bad("a keypoint is not a number".into());
+            }
+        }
+        for (i, sigmas) in self.sigmas_px.iter().enumerate().filter(|(_, sigmas)| !sigmas.is_empty()) {
+            if self.keypoints.get(i).is_none_or(|k| k.len() != sigmas.len()) || sigmas.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
+                return bad(format!("standard deviations of image {i} that are not one positive number a keypoint"));
+            }
+        }
+        for baseline in &self.rig.baselines {
+            if baseline.cameras.0.index().max(baseline.cameras.1.index()) >= self.cameras.len() || baseline.cameras.0 == baseline.cameras.1
+            {
+                return bad(format!("a baseline between cameras {} and {}", baseline.cameras.0, baseline.cameras.1));
+            }
+            if !are_positive(&[baseline.length_m, baseline.sigma_m]) {
+                return bad(format!("a baseline of {} m with a standard deviation of {} m", baseline.length_m, baseline.sigma_m));
+            }
+        }
+        for (index, bar) in self.scale_bars.iter().enumerate() {
+            if !are_positive(&[bar.length_m, bar.sigma_m]) {
+                return bad(format!("scale bar {index} of {} m with a standard deviation of {} m", bar.length_m, bar.sigma_m));
+            }
+        }
+        for pick in self.scale_bars.iter().flat_map(|bar| bar.ends.iter().flatten()) {
+            if pick.image.index() >= self.images.len() {
+                return bad(format!("a scale bar is picked in image {}, which does not exist", pick.image));
+            }
+            if !pick.pixel.iter().all(|v| v.is_finite()) {
+                return bad(format!("a scale bar is picked at no place of image {}", pick.image));
+            }
+        }
+        if self.rig.poses.len() > self.cameras.len() {
+            return bad(format!("{} poses in the rig of {} cameras", self.rig.poses.len(), self.cameras.len()));
+        }
+        for (camera, pose) in self.rig.poses.iter().enumerate() {
+            let Some(pose) = pose else { continue };
+            let Rigid3 { rotation, translation } = pose.cam_from_rig;
+            if !rotation.coords.iter().chain(&translation).all(|v| v.is_finite()) {
+                return bad(format!("the pose in the rig of camera {camera} is not finite"));
+            }
+            if pose.sigma.is_some_and(|(rotation, translation)| !are_positive(&[rotation, translation])) {
+                return bad(format!("the pose in the rig of camera {camera} has standard deviations that are not positive"));
+            }
+        }
+        Ok(())
+    }
+}

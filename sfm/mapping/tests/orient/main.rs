@@ -1,0 +1,10 @@
+//! Whole orientations of synthetic surveys against their truth.
+
+mod determinism;
+mod edges;
+mod exact;
+mod lengths;
+mod rig;
+mod single;
+mod support;
+mod wrong;
