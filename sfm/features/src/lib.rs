@@ -3,11 +3,13 @@
 mod error;
 mod matching;
 pub mod pairs;
+mod retrieval;
 mod sift;
 mod verify;
 
 pub use error::FeatureError;
 pub use matching::{MatchOptions, match_descriptors};
+pub use retrieval::{Codebook, GlobalDescriptor, RetrievalOptions};
 pub use sift::{SiftOptions, extract};
 pub use verify::{
     ImageForPair, InteriorEstimate, PairForInterior, PairVerdict, Rejection, VerifyOptions, interior_from_pairs, verify_pair,

@@ -46,6 +46,14 @@ pub fn match_descriptors(a: &[Descriptor], b: &[Descriptor], options: &MatchOpti
     match_with(Instructions::best(), a, b, options)
 }
 
+/// The position of the nearest of `among` for each of `of`, the lowest on ties. Exact. Empty where nothing is among.
+pub(crate) fn nearest(of: &[Descriptor], among: &[Descriptor]) -> Vec<u32> {
+    if of.is_empty() || among.is_empty() {
+        return Vec::new();
+    }
+    Instructions::best().scan(of, among).of_rows.iter().map(|nearest| nearest.index).collect()
+}
+
 /// [`match_descriptors`] with a given instruction set.
 pub(super) fn match_with(
     instructions: Instructions,

@@ -20,4 +20,5 @@ mod x86;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use matcher::nearest;
 pub use matcher::{MatchOptions, match_descriptors};
