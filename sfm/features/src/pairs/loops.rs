@@ -80,6 +80,8 @@ fn best(candidates: impl Iterator<Item = Candidate>, longest: usize) -> Vec<Cand
         candidates.select_nth_unstable_by_key(longest - 1, order);
     }
     candidates.truncate(longest);
+    // Thousands of these lists are kept, each made from thousands of candidates.
+    candidates.shrink_to_fit();
     candidates.sort_unstable_by_key(order);
     candidates
 }
