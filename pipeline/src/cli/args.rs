@@ -1,6 +1,6 @@
 //! What can be said on the command line.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 const EXIT_CODES: &str = "\
@@ -29,6 +29,8 @@ pub enum Command {
     Status(StatusArgs),
     /// Write a commented dive.toml for a folder of images or videos to stdout.
     Init(InitArgs),
+    /// Render a dive whose truth is known: frames, dive.toml, truth.
+    Synth(SynthArgs),
     /// Measure a cloud against a reference in the same frame.
     Eval(EvalArgs),
     /// Explain a command; `sfm help json` explains the keys of report.json.
@@ -76,6 +78,43 @@ pub struct InitArgs {
     pub folder: PathBuf,
 }
 
+/// Arguments of `sfm synth`.
+#[derive(Debug, Args)]
+pub struct SynthArgs {
+    /// Folder to write; new or empty.
+    pub folder: PathBuf,
+    /// Instants at which all cameras are exposed.
+    #[arg(long, value_name = "N", default_value_t = 14, value_parser = clap::value_parser!(u16).range(2..=9999))]
+    pub frames: u16,
+    /// Cameras of the rig: side by side, the third above them.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(2..=3))]
+    pub cameras: u8,
+    /// Width and height of an image, pixels.
+    #[arg(long, value_name = "WxH", default_value = "960x600", value_parser = image_size)]
+    pub size: (u32, u32),
+    /// What lies between scene and camera.
+    #[arg(long, value_enum, default_value_t = Water::Clear)]
+    pub water: Water,
+    /// Standard deviation of the sensor noise, grey values of 255.
+    #[arg(long, value_name = "GREY", default_value_t = 1.5, value_parser = noise)]
+    pub noise: f64,
+    /// Seed of path, texture, noise and picks: another one is another dive.
+    #[arg(long, value_name = "S", default_value_t = 7)]
+    pub seed: u64,
+    /// Number of threads; the bytes are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+/// What lies between scene and camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Water {
+    /// Clear coastal water.
+    Clear,
+    /// Air.
+    None,
+}
+
 /// Arguments of `sfm eval`.
 #[derive(Debug, Args)]
 pub struct EvalArgs {
@@ -114,4 +153,17 @@ pub struct HelpArgs {
 fn stage_name(text: &str) -> Result<String, String> {
     let names: Vec<&str> = crate::recipe::RECIPE.iter().map(|s| s.name).collect();
     if names.contains(&text) { Ok(text.to_owned()) } else { Err(format!("the stages are {}", names.join(", "))) }
+}
+
+fn image_size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    match sides {
+        Some((width, height)) if (64..=8192).contains(&width) && (64..=8192).contains(&height) => Ok((width, height)),
+        _ => Err("give width and height from 64 to 8192 pixels, for example 960x600".to_owned()),
+    }
+}
+
+fn noise(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v| (0.0..=100.0).contains(v));
+    value.ok_or_else(|| "give a number from 0 to 100, for example 1.5".to_owned())
 }

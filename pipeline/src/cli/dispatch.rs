@@ -1,7 +1,7 @@
 //! From the command line to an exit code.
 
 use super::args::{Cli, Command};
-use super::{eval, help, init, run, status};
+use super::{eval, help, init, run, status, synth};
 use crate::config::ConfigError;
 use crate::error::NoResult;
 use anyhow::Context;
@@ -22,6 +22,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(args),
         Command::Status(args) => status::status(args),
         Command::Init(args) => init::init(args),
+        Command::Synth(args) => synth::synth(args),
         Command::Eval(args) => eval::eval(args),
         Command::Help(args) => help::help(args),
     };

@@ -8,6 +8,8 @@ mod init;
 mod keys;
 mod run;
 mod status;
+mod summary;
+mod synth;
 mod terminal;
 
 pub use args::Cli;

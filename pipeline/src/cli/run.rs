@@ -2,6 +2,7 @@
 
 use super::args::RunArgs;
 use super::dispatch::{print, start_threads};
+use super::summary::summary;
 use super::terminal::Terminal;
 use crate::recipe::RECIPE;
 use crate::run::{Done, Selection};
@@ -20,10 +21,12 @@ pub(super) fn run(args: &RunArgs) -> Result<()> {
     terminal.close();
     let done = done?;
     tell_warnings(&done);
+    let report = figures::report(&config, &done.stamps);
     if args.json {
-        let report = figures::with_timings(figures::report(&config, &done.stamps), &done.timings);
+        let report = figures::with_timings(report, &done.timings);
         print(&format!("{report:#}\n"))?;
     } else {
+        eprint!("{}", summary(&report, &config.output));
         eprintln!("done: {}", config.output.display());
     }
     Ok(())

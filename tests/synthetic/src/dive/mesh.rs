@@ -47,12 +47,14 @@ fn add_block(mesh: &mut Mesh, block: &Block) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::surface::Material;
     use super::*;
 
     #[test]
     fn a_box_is_closed_and_faces_outwards() {
         let mut mesh = Mesh::default();
-        add_block(&mut mesh, &Block { low: Vector3::new(0.0, 0.0, 0.0), high: Vector3::new(2.0, 3.0, 4.0) });
+        let (low, high) = (Vector3::zeros(), Vector3::new(2.0, 3.0, 4.0));
+        add_block(&mut mesh, &Block { low, high, material: Material::Concrete });
         // The divergence theorem: a closed surface that faces outwards has a positive volume.
         let volume: f64 = mesh
             .faces

@@ -1,12 +1,24 @@
-//! What stands in the scene: a rippled sandy bottom, and a cube of concrete slabs and beams with cut-outs.
+//! What stands in the scene: a rippled sandy bottom, a cube of concrete slabs and beams with cut-outs, scale bars.
 
 use nalgebra::Vector3;
+
+/// What a surface is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Material {
+    /// The reef: concrete with growth.
+    Concrete,
+    /// The bottom.
+    Sand,
+    /// A scale bar with dark and bright bands.
+    Bar,
+}
 
 /// An axis-aligned box in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Block {
     pub low: Vector3<f64>,
     pub high: Vector3<f64>,
+    pub material: Material,
 }
 
 /// Where a ray meets the scene.
@@ -15,8 +27,7 @@ pub(super) struct Hit {
     /// Along the unit direction of the ray, metres.
     pub distance: f64,
     pub normal: Vector3<f64>,
-    /// The reef, and not the bottom.
-    pub is_reef: bool,
+    pub material: Material,
 }
 
 /// Half the side of the bottom, metres: beyond it there is only water.
@@ -43,7 +54,7 @@ fn bottom_normal(x: f64, y: f64) -> Vector3<f64> {
 
 /// The artificial reef: two slabs on four corner posts and four cross beams, 2.4 m wide and 2.2 m high.
 pub(super) fn reef() -> Vec<Block> {
-    let block = |low: [f64; 3], high: [f64; 3]| Block { low: Vector3::from(low), high: Vector3::from(high) };
+    let block = |low: [f64; 3], high: [f64; 3]| Block { low: Vector3::from(low), high: Vector3::from(high), material: Material::Concrete };
     let (half, post) = (1.2, 0.35);
     let mut blocks = vec![
         block([-half, -half, -0.2], [half, half, 0.25]),
@@ -75,14 +86,14 @@ pub(super) fn trace(blocks: &[Block], origin: &Vector3<f64>, direction: &Vector3
         if let Some((distance, normal)) = enter(block, origin, direction)
             && best.is_none_or(|b| distance < b.distance)
         {
-            best = Some(Hit { distance, normal, is_reef: true });
+            best = Some(Hit { distance, normal, material: block.material });
         }
     }
     if let Some(distance) = meet_bottom(origin, direction)
         && best.is_none_or(|b| distance < b.distance)
     {
         let p = origin + distance * direction;
-        best = Some(Hit { distance, normal: bottom_normal(p.x, p.y), is_reef: false });
+        best = Some(Hit { distance, normal: bottom_normal(p.x, p.y), material: Material::Sand });
     }
     best
 }
@@ -153,12 +164,12 @@ mod tests {
 
     #[test]
     fn rays_meet_box_and_bottom_where_they_should() {
-        let block = Block { low: Vector3::new(-1.0, -1.0, 1.0), high: Vector3::new(1.0, 1.0, 2.0) };
+        let block = Block { low: Vector3::new(-1.0, -1.0, 1.0), high: Vector3::new(1.0, 1.0, 2.0), material: Material::Concrete };
         let down = trace(&[block], &Vector3::new(0.2, 0.3, 5.0), &-Vector3::z()).expect("hits the top");
-        assert!((down.distance - 3.0).abs() < 1e-12 && down.is_reef);
+        assert!((down.distance - 3.0).abs() < 1e-12 && down.material == Material::Concrete);
         assert_eq!(down.normal, Vector3::z());
         let past = trace(&[block], &Vector3::new(3.0, 0.3, 5.0), &-Vector3::z()).expect("hits the bottom");
-        assert!((past.distance - (5.0 - bottom(3.0, 0.3))).abs() < 1e-9 && !past.is_reef);
+        assert!((past.distance - (5.0 - bottom(3.0, 0.3))).abs() < 1e-9 && past.material == Material::Sand);
         assert!(trace(&[block], &Vector3::new(3.0, 0.3, 5.0), &Vector3::z()).is_none());
     }
 }

@@ -1,5 +1,6 @@
 //! Albedo: noise of several octaves in 3D, so that it does not repeat and follows the surface.
 
+use super::surface::Material;
 use crate::random::mix;
 use nalgebra::Vector3;
 
@@ -41,11 +42,19 @@ pub(super) fn fractal(p: &Vector3<f64>, footprint_m: f64, seed: u64) -> f64 {
     sum
 }
 
-/// Linear RGB albedo of the reef (concrete with growth) or of the bottom (sand).
-pub(super) fn albedo(p: &Vector3<f64>, is_reef: bool, footprint_m: f64, seed: u64) -> [f64; 3] {
+/// Width of the bands of a scale bar, metres.
+const BAND_M: f64 = 0.1;
+
+/// Linear RGB albedo at a point of a surface.
+pub(super) fn albedo(p: &Vector3<f64>, material: Material, footprint_m: f64, seed: u64) -> [f64; 3] {
     let grain = fractal(p, footprint_m, seed);
     let tint = fractal(&(p * 0.6), footprint_m, seed ^ 0x5EED);
-    let (base, contrast) = if is_reef { ([0.30, 0.31, 0.24], 0.75) } else { ([0.52, 0.50, 0.42], 0.45) };
+    let (base, contrast) = match material {
+        Material::Concrete => ([0.30, 0.31, 0.24], 0.75),
+        Material::Sand => ([0.52, 0.50, 0.42], 0.45),
+        Material::Bar if ((p.x + p.z) / BAND_M).floor().rem_euclid(2.0) < 1.0 => ([0.06, 0.06, 0.06], 0.2),
+        Material::Bar => ([0.85, 0.84, 0.80], 0.1),
+    };
     let light = (1.0 + contrast * grain).max(0.08);
     [base[0] * light * (1.0 + 0.25 * tint), base[1] * light, base[2] * light * (1.0 - 0.2 * tint)].map(|v: f64| v.clamp(0.01, 0.95))
 }

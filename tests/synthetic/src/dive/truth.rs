@@ -1,7 +1,7 @@
 //! The truth of a dive as a reconstruction.
 
-use super::render::Dive;
-use scene::{CameraId, Frame, FrameId, Image, Reconstruction, Rig, RigId, RigSensor, Scale};
+use super::scene::Dive;
+use scene::{Camera, CameraId, Frame, FrameId, Image, Reconstruction, Rig, RigId, RigSensor, Rigid3, Scale};
 
 impl Dive {
     /// Name of a frame: `C1/0000` for the first camera and exposure, and `extension` after a dot.
@@ -14,24 +14,26 @@ impl Dive {
     /// [`crate::assert_near`] compares with.
     #[must_use]
     pub fn truth(&self, extension: &str) -> Reconstruction {
-        let sensors = self.cam_from_rig.iter().enumerate();
-        let rig = Rig { sensors: sensors.map(|(c, &cam_from_rig)| RigSensor { camera: CameraId::new(c), cam_from_rig }).collect() };
-        let poses = self.rig_from_world.iter().enumerate();
-        let frames = poses.map(|(e, &pose)| Frame { rig: RigId(0), exposure: e as u32, rig_from_world: Some(pose) }).collect();
-        let images = self.images.iter().map(|image| Image {
-            name: Self::name(image.camera, image.exposure, extension),
-            camera: CameraId::new(image.camera),
-            frame: FrameId::new(image.exposure),
-        });
-        Reconstruction {
-            cameras: self.cameras.clone(),
-            rigs: vec![rig],
-            frames,
-            images: images.collect(),
-            keypoints: vec![Vec::new(); self.images.len()],
-            points: Vec::new(),
-            scale: Scale::Metric,
-        }
+        reconstruction(&self.cameras, &self.cam_from_rig, &self.rig_from_world, extension)
+    }
+}
+
+pub(super) fn reconstruction(cameras: &[Camera], cam_from_rig: &[Rigid3], rig_from_world: &[Rigid3], extension: &str) -> Reconstruction {
+    let sensors = cam_from_rig.iter().enumerate();
+    let rig = Rig { sensors: sensors.map(|(c, &cam_from_rig)| RigSensor { camera: CameraId::new(c), cam_from_rig }).collect() };
+    let poses = rig_from_world.iter().enumerate();
+    let frames = poses.map(|(e, &pose)| Frame { rig: RigId(0), exposure: e as u32, rig_from_world: Some(pose) }).collect();
+    let shots = (0..cameras.len()).flat_map(|c| (0..rig_from_world.len()).map(move |e| (c, e)));
+    let images: Vec<Image> =
+        shots.map(|(c, e)| Image { name: Dive::name(c, e, extension), camera: CameraId::new(c), frame: FrameId::new(e) }).collect();
+    Reconstruction {
+        cameras: cameras.to_vec(),
+        rigs: vec![rig],
+        frames,
+        keypoints: vec![Vec::new(); images.len()],
+        images,
+        points: Vec::new(),
+        scale: Scale::Metric,
     }
 }
 
