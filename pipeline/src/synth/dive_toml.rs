@@ -26,7 +26,7 @@ pub(super) fn dive_toml(dive: &DiveScene, options: &DiveOptions) -> String {
     for (c, camera) in dive.cameras.iter().enumerate() {
         let name = format!("C{}", c + 1);
         let _ = write!(text, "\n[[camera]]\nname = \"{name}\"\nimages = \"frames/{name}\"\n");
-        let _ = writeln!(text, "# mask = \"truth/masks/{name}/{{stem}}.png\"  # the true masks, with [mask] strategy = \"files\"");
+        let _ = writeln!(text, "mask = \"truth/masks/{name}/{{stem}}.png\"  # the true masks; [mask] says whether they are used");
         if let [f, cx, cy, k] = camera.params() {
             text.push_str("# The true interior orientation, refined all the same; without it a guess is the start.\n");
             let _ = writeln!(text, "interior = {{ model = \"simple-radial\", f = {f:.3}, cx = {cx:.3}, cy = {cy:.3}, k = {k:.4} }}");
@@ -54,7 +54,7 @@ pub(super) fn dive_toml(dive: &DiveScene, options: &DiveOptions) -> String {
         }
         text.push_str("]\n");
     }
-    text.push_str("\n[mask]\nstrategy = \"ip\"  # structure against water by image processing; \"none\", \"files\"\n");
+    text.push_str("\n[mask]\nstrategy = \"none\"  # \"files\" takes the masks named above, \"ip\" makes some by image processing\n");
     text.push_str("\n[densify]\nquality = \"low\"  # quick; \"medium\" takes the frames as they are up to 960 pixels\n");
     text.push_str(
         "\n[evaluate]\nreference = \"truth/mesh.ply\"\npositions = \"truth/positions.txt\"  # moves the model to the frame of the mesh\n",
