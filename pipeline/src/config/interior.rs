@@ -50,7 +50,11 @@ pub(super) fn resolve(source: &mut Source<'_>, folder: &Path, raw: Option<&Spann
     InteriorConfig::default()
 }
 
-fn read_file(path: &Path, text: &str) -> Result<InteriorConfig, ConfigError> {
+/// Reads an interior orientation from the text of a file of its own.
+///
+/// # Errors
+/// [`ConfigError`] with everything that is wrong in it.
+pub(crate) fn read_file(path: &Path, text: &str) -> Result<InteriorConfig, ConfigError> {
     let mut source = Source::new(path, text);
     let config = super::resolve::raw_table::<RawInterior>(&mut source, |source, table| check_names(source, table, "camera.interior"))
         .map(|raw| values(&mut source, &raw, 0..0));

@@ -18,6 +18,7 @@ mod values;
 pub use error::{ConfigError, ConfigProblem};
 pub use files::IMAGE_EXTENSIONS;
 pub(crate) use files::{NamePart, is_image, natural_key};
+pub(crate) use interior::read_file as read_interior;
 pub use keys::KEYS;
 pub use model::*;
 pub(crate) use resolve::is_safe_name;

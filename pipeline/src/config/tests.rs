@@ -156,11 +156,11 @@ fn defaults() {
     assert_eq!((config.name.as_str(), config.frames_from), ("dive", FramesFrom::Order));
     assert_eq!(config.output.file_name().unwrap(), "out");
     assert_eq!((config.rig.mode, config.mask.strategy), (RigMode::None, MaskStrategy::None));
-    assert_eq!(config.features.max_keypoints, 8192);
+    assert_eq!((config.features.max_keypoints, config.features.double_up_to_mpx), (8192, 2.1));
     // As docs/dive-toml.md states them; they come from the packages.
     assert_eq!((config.matching.ratio, config.matching.max_error_px, config.matching.min_inliers), (0.8, 4.0, 15));
     assert_eq!((config.orient.initial_min_inliers, config.orient.initial_min_angle_deg, config.orient.min_angle_deg), (100, 16.0, 1.5));
-    assert_eq!((config.orient.register_max_error_px, config.orient.register_min_inliers, config.orient.max_error_px), (12.0, 30, 4.0));
+    assert_eq!((config.orient.register_max_error_px, config.orient.register_min_inliers, config.orient.max_error_px), (12.0, 30, 2.0));
     assert_eq!((config.densify.max_views, config.densify.min_views), (5, 3));
     let ImageSource::Files(files) = &config.cameras[0].images else { panic!("a folder gives files") };
     assert!(files[0].ends_with(Path::new("frames/left/1.jpg")));

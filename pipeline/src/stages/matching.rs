@@ -3,6 +3,7 @@
 use super::features;
 use super::images::ImageList;
 use super::interior::{self, Start};
+use super::loops;
 use crate::config::{Config, PairRule};
 use crate::error::NoResult;
 use crate::formats::{StoredFeatures, read_matches, write_matches};
@@ -16,7 +17,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "matching", version: 1, upstream: &["ingest", "features"], options, inputs: no_inputs, work };
+pub const STAGE: Stage = Stage { name: "matching", version: 2, upstream: &["ingest", "features"], options, inputs: no_inputs, work };
 
 /// Images whose pairs with later ones are made together; a run that is stopped loses their work.
 const ROWS_AT_ONCE: usize = 2;
@@ -94,7 +95,8 @@ fn rows(work: &Work<'_>, list: &ImageList) -> Result<BTreeMap<usize, Vec<usize>>
         ::features::pairs::exhaustive(n)
     } else {
         let exposures: Vec<u32> = list.images.iter().map(|image| image.exposure).collect();
-        ::features::pairs::sequential(&exposures, config.overlap)
+        let near = ::features::pairs::sequential(&exposures, config.overlap);
+        ::features::pairs::union(near, &loops::candidates(work, list, &exposures, config.overlap)?)
     };
     let mut rows: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (first, second) in pairs {

@@ -6,6 +6,7 @@ pub mod features;
 pub mod images;
 pub mod ingest;
 pub mod interior;
+mod loops;
 pub mod mask;
 pub mod matching;
 pub mod model;

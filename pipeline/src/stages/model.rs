@@ -1,12 +1,17 @@
-//! The model that `orient` makes, in COLMAP's binary form.
+//! The model that `orient` makes: in COLMAP's binary form, with the cameras once more to the last digit.
 
+use super::images::ImageList;
+use crate::formats::{read_calibration, write_calibration};
 use crate::stage::Work;
 use crate::store::Fingerprint;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use scene::format::colmap::{ColmapFiles, read_colmap};
 use scene::format::{ColmapModel, write_ply_cloud};
-use scene::{Cloud, Reconstruction, Scale};
+use scene::{Camera, CameraModel, Cloud, Reconstruction, Scale};
 use std::io::Write;
+
+/// Position of the shear C2 among the parameters of Brown's model.
+const BROWN_SHEAR: usize = 9;
 
 /// The files of a model, in the order in which they are written.
 const FILES: [&str; 5] = ["cameras.bin", "rigs.bin", "frames.bin", "images.bin", "points3D.bin"];
@@ -20,19 +25,53 @@ pub fn load(work: &Work<'_>) -> Result<Reconstruction> {
     let (rigs, frames) = (rigs?, frames?);
     let files = ColmapFiles { cameras: &cameras?, rigs_and_frames: Some((&rigs, &frames)), images: &images?, points: &points? };
     let mut model = read_colmap(&files)?;
+    let names = ImageList::load(work)?.cameras;
+    for (camera, entry) in model.cameras.iter_mut().zip(&names) {
+        let file = calibration_file(&entry.name);
+        *camera = read_calibration(&work.store.path(&file), &work.read("orient", &file)?).with_context(|| file.clone())?;
+    }
     let metric = work.done.get("orient").is_some_and(|stamp| stamp.figures["scale"] == "metric");
     model.scale = if metric { Scale::Metric } else { Scale::Arbitrary };
     Ok(model)
 }
 
+fn calibration_file(camera: &str) -> String {
+    format!("calib/{camera}.toml")
+}
+
+/// Writes the interior orientation of every camera.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn save_calibrations(work: &Work<'_>, model: &Reconstruction, list: &ImageList) -> Result<()> {
+    for (camera, entry) in model.cameras.iter().zip(&list.cameras) {
+        let text = write_calibration(camera, &entry.name);
+        work.files.save(&calibration_file(&entry.name), Fingerprint::of_bytes(text.as_bytes()), text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// The model as COLMAP can hold it: without shear. `None` when it can hold it as it is.
+fn without_shear(model: &Reconstruction) -> Option<Reconstruction> {
+    let has_shear = |camera: &Camera| camera.model() == CameraModel::Brown && camera.params()[BROWN_SHEAR] != 0.0;
+    model.cameras.iter().any(has_shear).then(|| {
+        let mut model = model.clone();
+        for camera in model.cameras.iter_mut().filter(|camera| has_shear(camera)) {
+            camera.params_mut()[BROWN_SHEAR] = 0.0;
+        }
+        model
+    })
+}
+
 type Writer = fn(&ColmapModel<'_>, &mut dyn Write) -> std::io::Result<()>;
 
-/// Writes a model and its points as a cloud below a folder.
+/// Writes a model and its points as a cloud below a folder. The shear of a camera of Brown's model is left out: COLMAP's models have none.
 ///
 /// # Errors
 /// When COLMAP cannot hold the model, or a file cannot be written.
 pub fn save(work: &Work<'_>, model: &Reconstruction, folder: &str) -> Result<()> {
-    let colmap = ColmapModel::new(model)?;
+    let sheared = without_shear(model);
+    let colmap = ColmapModel::new(sheared.as_ref().unwrap_or(model))?;
     let writers: [Writer; 5] = [
         |m, out| m.write_cameras_binary(out),
         |m, out| m.write_rigs_binary(out),

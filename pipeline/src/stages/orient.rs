@@ -61,6 +61,7 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
         Err(error) => return Err(error.into()),
     };
     let largest = orientation.models.first().context("the orientation has no model")?;
+    model::save_calibrations(work, largest, &list)?;
     model::save(work, largest, "sparse")?;
     for (i, model) in orientation.models.iter().enumerate().skip(1) {
         model::save(work, model, &format!("sparse/{i}"))?;

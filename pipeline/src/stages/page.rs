@@ -107,9 +107,9 @@ fn sections(figures: &Value) -> Vec<Section> {
         section("Baselines", "", &["between", "given, m", "found, m", "sigma, m", "residual / sigma"], baselines),
         section("Known lengths", "", &["length", "given, m", "found, m", "error, m", "role"], bars),
         section("Pairs of images", "", &["tried", "verified", "calibrated", "uncalibrated", "planar or panoramic"], pairs),
-        section("Models", "More than one: the images fell apart.", &["images", "points"], models),
     ];
-    sections.into_iter().filter(|s| !s.rows.is_empty()).collect()
+    let fell_apart = (models.len() > 1).then(|| section("Models", "The images fell apart.", &["images", "points"], models));
+    sections.into_iter().chain(fell_apart).filter(|s| !s.rows.is_empty()).collect()
 }
 
 fn text(value: &Value) -> String {
@@ -143,7 +143,7 @@ fn scene(work: &Work<'_>, model: &Reconstruction) -> Result<Scene3d> {
         let half_extent = [f64::from(camera.width()) / 2.0 / focal, f64::from(camera.height()) / 2.0 / focal];
         Some(CameraGlyph { name: entry.name.clone(), cam_from_world: model.cam_from_world(image)?, half_extent })
     });
-    let unit = if model.scale == scene::Scale::Metric { "m" } else { "unknown unit" };
+    let unit = if model.scale == scene::Scale::Metric { "m" } else { "units" };
     let sets = [dense, sparse].into_iter().filter(|set| !set.positions.is_empty()).collect();
     Ok(Scene3d { sets, cameras: cameras.collect(), unit: unit.to_owned() })
 }

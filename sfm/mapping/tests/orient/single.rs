@@ -79,7 +79,7 @@ fn precise_keypoints_weigh_more() {
     let (made, mut input) = made(&SurveyOptions { noise_px: 0.0, ..noisy(1) });
     let mut random = Random::new(5);
     // Half of the keypoints are five times as good as the others.
-    let sigma = |k: usize| if k % 2 == 0 { 0.2f32 } else { 1.0 };
+    let sigma = |k: usize| if k.is_multiple_of(2) { 0.2f32 } else { 1.0 };
     for keypoints in &mut input.keypoints {
         for (k, at) in keypoints.iter_mut().enumerate() {
             *at = at.map(|x| x + sigma(k) * random.normal() as f32);

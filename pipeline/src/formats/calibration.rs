@@ -1,0 +1,48 @@
+//! Interior orientation as the TOML file that `[camera.interior] file` reads: what one dive found can start the next.
+
+use crate::config::read_interior;
+use anyhow::{Context, Result};
+use scene::Camera;
+use std::fmt::Write;
+use std::path::Path;
+
+/// The file of a camera; every number is written so that it is read back to the last bit.
+#[must_use]
+pub fn write_calibration(camera: &Camera, camera_name: &str) -> String {
+    let mut text = format!("# Interior orientation of camera {camera_name}, pixels.\nmodel = \"{}\"\n", camera.model().name());
+    let _ = writeln!(text, "width = {}\nheight = {}", camera.width(), camera.height());
+    for (name, value) in camera.model().param_names().iter().zip(camera.params()) {
+        let _ = writeln!(text, "{name} = {value:?}");
+    }
+    text
+}
+
+/// Reads what [`write_calibration`] wrote.
+///
+/// # Errors
+/// When the text is damaged.
+pub fn read_calibration(file: &Path, bytes: &[u8]) -> Result<Camera> {
+    let interior = read_interior(file, std::str::from_utf8(bytes)?)?;
+    let (width, height) = interior.size.context("no image size")?;
+    let params: Option<Vec<f64>> = interior.params.into_iter().collect();
+    Ok(Camera::new(interior.model, width, height, &params.context("a parameter is missing")?)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene::CameraModel;
+
+    #[test]
+    fn every_model_is_read_back_to_the_last_bit() {
+        for model in CameraModel::ALL {
+            let mut camera = Camera::from_focal(model, 1360, 1024, 1000.0 / 3.0).unwrap();
+            for (i, value) in camera.params_mut().iter_mut().enumerate() {
+                *value += (0.1 + i as f64).sin() * 10f64.powi(-3 * i as i32);
+            }
+            let text = write_calibration(&camera, "C1");
+            assert_eq!(read_calibration(Path::new("C1.toml"), text.as_bytes()).unwrap(), camera, "{text}");
+        }
+        assert!(read_calibration(Path::new("C1.toml"), b"model = \"pinhole\"\nfx = 1.0").is_err());
+    }
+}
