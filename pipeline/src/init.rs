@@ -115,7 +115,7 @@ fn camera_of_images(folder: &Path, images: &[PathBuf]) -> FoundCamera {
     focals.sort_by(f64::total_cmp);
     remarks.push(match focals.get(focals.len() / 2) {
         Some(focal) => format!("EXIF gives a focal length of {focal:.0} px, taken as the start"),
-        None => "no focal length in EXIF: a guess of 1.2 times the longer side is the start".to_owned(),
+        None => "no focal length in EXIF: the best of several guesses is the start".to_owned(),
     });
     let stems = images.iter().map(|i| i.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()).collect();
     FoundCamera { name: name_of(folder), path: folder.to_path_buf(), is_video: false, remarks, stems, times }

@@ -60,7 +60,7 @@ impl Work<'_> {
     pub fn read(&self, stage: &'static str, path: &str) -> Result<Vec<u8>, StoreError> {
         let output = self.output(stage, path)?;
         let file = self.store.path(path);
-        let bytes = std::fs::read(&file).map_err(|source| StoreError::Read { path: file.clone(), source })?;
+        let bytes = std::fs::read(&file).map_err(|cause| StoreError::Read { path: file.clone(), cause })?;
         if Fingerprint::of_bytes(&bytes) == output.content {
             Ok(bytes)
         } else {

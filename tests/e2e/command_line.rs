@@ -167,3 +167,38 @@ fn help_explains_every_key_of_the_report() {
         assert!(known.contains(&key.as_str()), "{key} is not explained");
     }
 }
+
+/// The examples say what is read, whatever lies at `SFM_DATA`; without it, what is missing.
+#[test]
+fn every_example_is_read() {
+    let dive = Dive::empty();
+    for folder in [
+        "sceaux",
+        "fountain-p11/images",
+        "herz-jesus-p8/images",
+        "kitti-1/image_l",
+        "kitti-1/image_r",
+        "haltbrekken/left",
+        "haltbrekken/right",
+    ] {
+        std::fs::create_dir_all(dive.path(&format!("data/{folder}"))).unwrap();
+        std::fs::write(dive.path(&format!("data/{folder}/0.png")), support::png(8, 8, 1)).unwrap();
+    }
+    std::fs::create_dir_all(dive.path("data/reef-clip")).unwrap();
+    std::fs::write(dive.path("data/reef-clip/reef_clip.mp4"), "x").unwrap();
+    let mut count = 0;
+    for entry in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../examples")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        count += 1;
+        dive.write("dive.toml", &std::fs::read_to_string(&path).unwrap());
+        let with = dive.command(&["status"]).env("SFM_DATA", dive.path("data")).output().unwrap();
+        assert!(with.status.success(), "{}: {}", path.display(), String::from_utf8_lossy(&with.stderr));
+        let without = dive.command(&["status"]).env_remove("SFM_DATA").output().unwrap();
+        assert_eq!(without.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&without.stderr).contains("the environment variable SFM_DATA is not set"));
+    }
+    assert!(count >= 6, "{count} examples");
+}

@@ -16,7 +16,9 @@ fn dive() -> Dive {
     let cameras = "[[camera]]\nimages = \"frames/C1\"\n[[camera]]\nimages = \"frames/C2\"\n";
     let baseline = "[[rig.baseline]]\nbetween = [\"C1\", \"C2\"]\nlength_m = 0.4\n";
     for output in ["one", "two", "killed"] {
-        let text = format!("[dive]\noutput = \"{output}\"\n{cameras}{baseline}[mask]\nstrategy = \"ip\"\n[densify]\nquality = \"low\"\n");
+        let text = format!(
+            "[dive]\noutput = \"{output}\"\n{cameras}{baseline}[mask]\nstrategy = \"ip\"\n[matching]\npairs = \"sequential\"\noverlap = 1\n[densify]\nquality = \"low\"\n"
+        );
         dive.write(&format!("{output}.toml"), &text);
     }
     dive

@@ -17,6 +17,7 @@ pub(super) struct NoTopic {
 
 pub(super) fn help(args: &HelpArgs) -> Result<()> {
     let mut command = Cli::command();
+    command.build();
     match args.topic.as_deref() {
         None => print(&command.render_long_help().to_string()),
         Some("json") => print(&json()),

@@ -26,7 +26,7 @@ pub(super) fn run(args: &RunArgs) -> Result<()> {
         let report = figures::with_timings(report, &done.timings);
         print(&format!("{report:#}\n"))?;
     } else {
-        eprint!("{}", summary(&report, &config.output));
+        eprint!("{}", summary(&report, &config.output, |stage| done.stamps.contains_key(stage)));
         eprintln!("done: {}", config.output.display());
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! Finds the images, leaves out what cannot be used, and says which were exposed together.
 
 use super::images::{CameraEntry, FILE, ImageEntry, ImageList, frame_file};
+use super::interior;
 use super::pairing::{self, Exposure};
 use crate::config::{CameraConfig, Config, ImageSource};
 use crate::error::NoResult;
@@ -104,6 +105,8 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
         let reason = warnings.first().map(|w| format!("; {}: {}", w.about, w.message)).unwrap_or_default();
         return Err(NoResult(format!("none of the {} images can be used{reason}", list.found)).into());
     }
+    // A calibration that cannot belong to the images is told before hours are spent on them.
+    interior::starts(work.config, &list)?;
     let names: Vec<&str> = list.cameras.iter().map(|c| c.name.as_str()).collect();
     let (numbers, pairing_warnings) = pairing::pair_up(&names, &exposures, work.config.frames_from);
     warnings.extend(pairing_warnings);

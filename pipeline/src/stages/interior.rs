@@ -3,7 +3,7 @@
 use super::images::{CameraEntry, ImageList};
 use crate::config::{Config, InteriorConfig};
 use crate::store::Warning;
-use ::features::{PairForInterior, interior_from_pairs};
+use ::features::{InteriorEstimate, PairForInterior, interior_from_pairs};
 use anyhow::{Result, bail};
 use scene::camera::ParamKind;
 use scene::{Camera, ImageId, Keypoint, VerifiedPair};
@@ -95,20 +95,30 @@ pub fn add_alternatives(
     config: &Config,
 ) -> Result<()> {
     let camera_of = |image: ImageId| list.images[image.index()].camera;
-    for (c, start) in starts.iter_mut().enumerate().filter(|(_, s)| s.origin == Origin::Guess) {
-        let own: Vec<PairForInterior<'_>> = pairs
-            .iter()
-            .filter(|pair| camera_of(pair.images.0) == c && camera_of(pair.images.1) == c)
-            .map(|pair| PairForInterior { pair, keypoints: (&keypoints[pair.images.0.index()], &keypoints[pair.images.1.index()]) })
-            .collect();
+    let found: Vec<Option<InteriorEstimate>> = starts
+        .iter()
+        .enumerate()
+        .map(|(c, start)| {
+            let own: Vec<PairForInterior<'_>> = pairs
+                .iter()
+                .filter(|pair| start.origin == Origin::Guess && camera_of(pair.images.0) == c && camera_of(pair.images.1) == c)
+                .map(|pair| PairForInterior { pair, keypoints: (&keypoints[pair.images.0.index()], &keypoints[pair.images.1.index()]) })
+                .collect();
+            let size = (start.camera.width(), start.camera.height());
+            interior_from_pairs(&own, size, config.matching.max_error_px, u64::from(config.orient.seed))
+        })
+        .collect();
+    let over_longer = |found: &InteriorEstimate| Some(found.focal_px? / f64::from(found.size.0.max(found.size.1)));
+    // Cameras of a rig are mostly alike, and alternatives of one position are tried together.
+    let any_estimate = found.iter().flatten().find_map(over_longer);
+    for (start, found) in starts.iter_mut().zip(&found).filter(|(s, _)| s.origin == Origin::Guess) {
         let (model, size) = (start.camera.model(), (start.camera.width(), start.camera.height()));
         let longer = f64::from(size.0.max(size.1));
-        let found = interior_from_pairs(&own, size, config.matching.max_error_px, u64::from(config.orient.seed));
-        let focals = found.and_then(|f| f.focal_px).into_iter().chain(FURTHER_GUESSES.map(|g| g * longer));
-        for focal in focals {
-            start.alternatives.push(match &found {
-                Some(found) => found.with_focal(model, focal)?,
-                None => Camera::from_focal(model, size.0, size.1, focal)?,
+        let estimate = found.as_ref().and_then(over_longer).or(any_estimate);
+        for guess in estimate.into_iter().chain(FURTHER_GUESSES) {
+            start.alternatives.push(match found {
+                Some(found) => found.with_focal(model, guess * longer)?,
+                None => Camera::from_focal(model, size.0, size.1, guess * longer)?,
             });
         }
     }

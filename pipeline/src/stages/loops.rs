@@ -9,6 +9,9 @@ use anyhow::Result;
 use rayon::prelude::*;
 use scene::{Descriptor, ImageId};
 
+/// Seed of the vocabulary: a draw of it is as good as another.
+const SEED: u64 = 0;
+
 /// Candidates for loops farther than `window` exposures along the path, from a vocabulary that the dive itself gives.
 ///
 /// # Errors
@@ -18,7 +21,7 @@ pub fn candidates(work: &Work<'_>, list: &ImageList, exposures: &[u32], window: 
     work.progress.begin("looking for loops", 2 * count);
     // The descriptors of all images would not fit into memory: each is read twice.
     let shares: Vec<Vec<Descriptor>> = each(work, list, |descriptors| Codebook::share(descriptors, count, &options).copied().collect())?;
-    let codebook = Codebook::learn(&shares.concat(), &options, u64::from(work.config.orient.seed))?;
+    let codebook = Codebook::learn(&shares.concat(), &options, SEED)?;
     drop(shares);
     let described: Vec<Option<GlobalDescriptor>> = each(work, list, |descriptors| Some(codebook.describe(descriptors)))?;
     Ok(loop_candidates(&described, exposures, &LoopOptions { window, ..LoopOptions::default() }))

@@ -7,7 +7,8 @@ use crate::store::Fingerprint;
 use anyhow::{Context, Result};
 use scene::format::colmap::{ColmapFiles, read_colmap};
 use scene::format::{ColmapModel, write_ply_cloud};
-use scene::{Camera, CameraModel, Cloud, Reconstruction, Scale};
+use scene::{Camera, CameraId, CameraModel, Cloud, Reconstruction, Scale};
+use std::collections::BTreeSet;
 use std::io::Write;
 
 /// Position of the shear C2 among the parameters of Brown's model.
@@ -28,6 +29,9 @@ pub fn load(work: &Work<'_>) -> Result<Reconstruction> {
     let names = ImageList::load(work)?.cameras;
     for (camera, entry) in model.cameras.iter_mut().zip(&names) {
         let file = calibration_file(&entry.name);
+        if !work.has("orient", &file) {
+            continue;
+        }
         *camera = read_calibration(&work.store.path(&file), &work.read("orient", &file)?).with_context(|| file.clone())?;
     }
     let metric = work.done.get("orient").is_some_and(|stamp| stamp.figures["scale"] == "metric");
@@ -39,12 +43,16 @@ fn calibration_file(camera: &str) -> String {
     format!("calib/{camera}.toml")
 }
 
-/// Writes the interior orientation of every camera.
+/// Writes the interior orientation of every camera that has oriented images: of another there is nothing but its start.
 ///
 /// # Errors
 /// When a file cannot be written.
 pub fn save_calibrations(work: &Work<'_>, model: &Reconstruction, list: &ImageList) -> Result<()> {
-    for (camera, entry) in model.cameras.iter().zip(&list.cameras) {
+    let used: BTreeSet<CameraId> = model.oriented_images().map(|i| model.images[i.index()].camera).collect();
+    for (c, (camera, entry)) in model.cameras.iter().zip(&list.cameras).enumerate() {
+        if !used.contains(&CameraId::new(c)) {
+            continue;
+        }
         let text = write_calibration(camera, &entry.name);
         work.files.save(&calibration_file(&entry.name), Fingerprint::of_bytes(text.as_bytes()), text.as_bytes())?;
     }

@@ -54,6 +54,10 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
     let list = ImageList::load(work)?;
     let mut warnings = Vec::new();
     let (input, starts) = input(work, &list, &mut warnings)?;
+    if work.config.rig.mode == RigMode::None && !work.config.rig.baselines.is_empty() {
+        let message = "the baselines are not used: rig.mode is \"none\"".to_owned();
+        warnings.push(Warning { about: "dive.toml".to_owned(), message });
+    }
     work.progress.begin("orienting", 0);
     let orientation = match mapping::orient(&input, &options_of(work.config)) {
         Ok(orientation) => orientation,
@@ -111,7 +115,16 @@ fn input(work: &Work<'_>, list: &ImageList, warnings: &mut Vec<Warning>) -> Resu
     interior::add_alternatives(&mut starts, list, &keypoints, &pairs, work.config)?;
     let image = |image: &ImageEntry| ImageInput { name: image.name.clone(), camera: CameraId::new(image.camera), exposure: image.exposure };
     let input = MapInput {
-        cameras: starts.iter().map(|s| CameraInput { camera: s.camera, fixed: s.fixed, alternatives: s.alternatives.clone() }).collect(),
+        cameras: starts
+            .iter()
+            .zip(&list.cameras)
+            .map(|(s, entry)| CameraInput {
+                name: entry.name.clone(),
+                camera: s.camera,
+                fixed: s.fixed,
+                alternatives: s.alternatives.clone(),
+            })
+            .collect(),
         images: list.images.iter().map(image).collect(),
         keypoints: keypoints.iter().map(|some| some.iter().map(|k| [k.x, k.y]).collect()).collect(),
         sigmas_px: keypoints.iter().map(|some| some.iter().map(|k| SIGMA_OF_SCALE * k.scale).collect()).collect(),

@@ -44,7 +44,7 @@ pub(super) fn page(work: &Work<'_>, figures: &Value) -> Result<Report> {
 }
 
 fn verdict(figures: &Value) -> String {
-    let scale = if figures["scale"] == "metric" { "in metres" } else { "in an unknown unit: no length was given" };
+    let scale = if figures["scale"] == "metric" { "in metres" } else { "in an unknown unit: no known length could be used" };
     format!(
         "{} of {} images oriented, {scale}, at a reprojection error of {} px.",
         text(&figures["images"]["oriented"]),

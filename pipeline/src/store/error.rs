@@ -8,28 +8,28 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum StoreError {
     /// The folder cannot be made or written to.
-    #[error("cannot write to the output folder {folder}: {source}", folder = folder.display())]
+    #[error("cannot write to the output folder {folder}: {cause}", folder = folder.display())]
     Folder {
         /// The folder.
         folder: PathBuf,
         /// Why.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A file could not be written, renamed or removed.
-    #[error("cannot write {path}: {source}{hint}", path = path.display(), hint = hint(source))]
+    #[error("cannot write {path}: {cause}{hint}", path = path.display(), hint = hint(cause))]
     Write {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A file could not be read.
-    #[error("cannot read {path}: {source}", path = path.display())]
+    #[error("cannot read {path}: {cause}", path = path.display())]
     Read {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: io::Error,
+        cause: io::Error,
     },
     /// The folder holds something of a name that the run would use, and no run of ours wrote it.
     #[error(
@@ -77,11 +77,11 @@ fn hint(source: &io::Error) -> &'static str {
 impl StoreError {
     pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_path_buf();
-        move |source| Self::Write { path, source }
+        move |cause| Self::Write { path, cause }
     }
 
     pub(super) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_path_buf();
-        move |source| Self::Read { path, source }
+        move |cause| Self::Read { path, cause }
     }
 }

@@ -57,7 +57,7 @@ impl Store {
     /// # Errors
     /// As [`Store::open`].
     pub fn open_with(root: &Path, disk: Box<dyn Disk>) -> Result<Self, StoreError> {
-        let folder_error = |source| StoreError::Folder { folder: root.to_path_buf(), source };
+        let folder_error = |cause| StoreError::Folder { folder: root.to_path_buf(), cause };
         disk.create_folder(root).map_err(folder_error)?;
         let marker = root.join(MARKER);
         if !marker.exists() {

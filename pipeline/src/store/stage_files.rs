@@ -101,7 +101,7 @@ impl<'s> StageFiles<'s> {
         warnings.dedup();
         let stamp = Stamp { fingerprint: identity.fingerprint(self.stage), identity, outputs, figures, warnings };
         let text = serde_json::to_vec_pretty(&stamp)
-            .map_err(|e| StoreError::Write { path: self.store.path(&stamp_file(self.stage)), source: e.into() })?;
+            .map_err(|e| StoreError::Write { path: self.store.path(&stamp_file(self.stage)), cause: e.into() })?;
         self.store.write(&stamp_file(self.stage), &text)?;
         let journal = self.store.path(&journal_file(self.stage));
         self.store.disk().remove(&journal).map_err(StoreError::write(&journal))?;

@@ -24,12 +24,12 @@ pub enum SynthError {
         folder: PathBuf,
     },
     /// A file or folder cannot be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     File {
         /// The file or folder.
         path: PathBuf,
         /// Why.
-        source: io::Error,
+        cause: io::Error,
     },
 }
 
@@ -80,7 +80,7 @@ impl Folder {
 
 fn failed(path: &Path) -> impl FnOnce(io::Error) -> SynthError {
     let path = path.to_path_buf();
-    move |source| SynthError::File { path, source }
+    move |cause| SynthError::File { path, cause }
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub enum DenseError {
         why: &'static str,
     },
     /// The lens of a view cannot be represented without distortion.
-    #[error("image {image} cannot be made free of distortion: {source}")]
+    #[error("image {image} cannot be made free of distortion")]
     Rectification {
         /// The image.
         image: ImageId,

@@ -18,7 +18,11 @@ fn input(cameras: usize) -> MapInput {
         exposure: truth.frames[image.frame.index()].exposure,
     });
     MapInput {
-        cameras: truth.cameras.iter().map(|&camera| CameraInput { camera, fixed: false, alternatives: Vec::new() }).collect(),
+        cameras: truth
+            .cameras
+            .iter()
+            .map(|&camera| CameraInput { name: "camera".into(), camera, fixed: false, alternatives: Vec::new() })
+            .collect(),
         images: images.collect(),
         keypoints: truth.keypoints,
         pairs: made.pairs,

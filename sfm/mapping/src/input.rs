@@ -27,6 +27,8 @@ pub struct MapInput {
 /// A camera and how far its interior orientation is trusted.
 #[derive(Clone, Debug)]
 pub struct CameraInput {
+    /// Unique name.
+    pub name: String,
     /// Start values.
     pub camera: Camera,
     /// The values are not refined.

@@ -48,11 +48,14 @@ pub(crate) fn best_interior(empty: &Model, allowed: &[bool], options: &OrientOpt
         }
         trials.extend(trial(&model, allowed, options)?.map(|trial| Trial { cameras: model.cameras, ..trial }));
     }
+    // One that ran off to what cannot be may fit more, loosely.
+    let any_plausible = trials.iter().any(|t| t.plausible);
+    trials.retain(|t| t.plausible || !any_plausible);
     let richest = trials.iter().map(|t| t.observations).max().unwrap_or(0);
     let best = trials
         .into_iter()
         .filter(|t| t.observations as f64 >= RICH_SHARE * richest as f64)
-        .min_by(|a, b| b.plausible.cmp(&a.plausible).then(a.mean_square_px.total_cmp(&b.mean_square_px)));
+        .min_by(|a, b| a.mean_square_px.total_cmp(&b.mean_square_px));
     Ok(best.map_or_else(|| empty.cameras.clone(), |t| t.cameras))
 }
 
@@ -96,8 +99,13 @@ pub(crate) fn is_plausible(camera: &Camera) -> bool {
     // Its image is proportional to the angle from the axis, that of the others to the tangent.
     let is_fisheye = camera.model() == CameraModel::Fisheye;
     let centre = Vector2::from(camera.principal_point());
-    let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
-    let straight = corners.iter().all(|corner| {
+    // A fisheye's corners may lie outside of what it images.
+    let edge = if is_fisheye {
+        [[0.0, height / 2.0], [width, height / 2.0], [width / 2.0, 0.0], [width / 2.0, height]]
+    } else {
+        [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]]
+    };
+    let straight = edge.iter().all(|corner| {
         let corner = Vector2::from(*corner);
         let from_axis = camera.unproject(&corner).map(|ray| if is_fisheye { ray.norm().atan() } else { ray.norm() });
         let stretch = from_axis.map(|x| x * focal / (corner - centre).norm());

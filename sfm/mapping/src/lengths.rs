@@ -38,8 +38,11 @@ impl Lengths {
         let baselines = match rig.mode {
             RigMode::None => Vec::new(),
             // One pose a frame: a baseline is one and the same in every exposure and counts once.
-            RigMode::Rigid => rig.baselines.iter().filter_map(|b| Some((b, *simultaneous(model, b.cameras).first()?))).map(known).collect(),
-            RigMode::Baselines => rig
+            RigMode::Rigid if model.rigs.len() == 1 => {
+                rig.baselines.iter().filter_map(|b| Some((b, *simultaneous(model, b.cameras).first()?))).map(known).collect()
+            }
+            // A rig that could not be solved leaves every image its own pose.
+            RigMode::Rigid | RigMode::Baselines => rig
                 .baselines
                 .iter()
                 .flat_map(|b| simultaneous(model, b.cameras).into_iter().map(move |images| known((b, images))))

@@ -35,11 +35,12 @@ pub fn orient(input: &MapInput, options: &OrientOptions) -> Result<Orientation, 
     let counts: Vec<usize> = input.keypoints.iter().map(Vec::len).collect();
     let graph = CorrespondenceGraph::new(&counts, &input.pairs);
     let mut notes = Vec::new();
-    let mut done = first_model(input, &graph, options, &mut notes)?;
+    let done = first_model(input, &graph, options, &mut notes)?;
     for (c, camera) in done.model.cameras.iter().enumerate().filter(|(c, _)| !input.cameras[*c].fixed) {
         if !is_plausible(camera) {
             notes.push(format!(
-                "the interior orientation found for camera {c} is not that of a lens ({} {:?}): do not trust the model, give a calibration",
+                "the interior orientation found for {} is not that of a lens ({} {:?}): do not trust the model, give a calibration",
+                input.cameras[c].name,
                 camera.model().name(),
                 camera.params()
             ));
@@ -58,7 +59,6 @@ pub fn orient(input: &MapInput, options: &OrientOptions) -> Result<Orientation, 
         }
         notes.extend(contradiction::note(&further.model, options));
         models.push(reconstruction(&further.model, further.scale));
-        done.model.cameras.clone_from(&further.model.cameras);
     }
     models[1..].sort_by_key(|m| std::cmp::Reverse(m.oriented_images().count()));
     let left_out = (0..input.images.len())
@@ -92,17 +92,36 @@ fn first_model<'a>(
     let mut independent = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
     let any = vec![true; independent.frames.len()];
     independent.cameras = best_interior(&independent, &any, options)?;
+    let mut on_few_exposures = None;
     if let Some(cam_from_rig) = known_rig(input) {
         let taken = vec![false; input.images.len()];
         if let Some(done) = on_rig(input, graph, (independent.cameras.clone(), &cam_from_rig, Scale::Metric), &taken, options)? {
-            return Ok(done);
+            if done.model.oriented_frames().len() >= options.min_model_frames.min(done.model.frames.len()) {
+                return Ok(done);
+            }
+            on_few_exposures = Some(done);
         }
         notes
             .push("no exposure has enough matches between its cameras: images were oriented one by one, and then joined by the rig".into());
     }
-    let starts = from_pairs(&independent, &any, options);
+    match (one_by_one(input, &independent, options, notes), on_few_exposures) {
+        (Ok(done), Some(few)) if done.model.oriented_images().len() <= few.model.oriented_images().len() => Ok(few),
+        (Err(MapError::NoInitialPair { .. }), Some(few)) => Ok(few),
+        (done, _) => done,
+    }
+}
+
+/// A model of images with a pose each, then on the rig where there is one and it can be solved.
+fn one_by_one<'a>(
+    input: &'a MapInput,
+    independent: &Model<'a>,
+    options: &OrientOptions,
+    notes: &mut Vec<String>,
+) -> Result<Done<'a>, MapError> {
+    let any = vec![true; independent.frames.len()];
+    let starts = from_pairs(independent, &any, options);
     let none = MapError::NoInitialPair { candidates: starts.tried, best_inliers: starts.best_inliers, needed: options.initial_min_inliers };
-    let Some((mut model, tries)) = best_model(&independent, &starts, &any, options)? else { return Err(none) };
+    let Some((mut model, tries)) = best_model(independent, &starts, &any, options)? else { return Err(none) };
     let outcomes = by_image(&model, &tries);
     let mut scale = Scale::Arbitrary;
     if input.rig.mode == RigMode::Rigid && input.cameras.len() > 1 {
@@ -119,8 +138,9 @@ fn first_model<'a>(
                 }
             }
             Err(missing) => notes.push(format!(
-                "cameras {} are never oriented together with camera 0: the rig stays unknown and images keep poses of their own",
-                missing.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+                "{} and {} are oriented together too rarely: the rig stays unknown and images keep poses of their own",
+                missing.iter().map(|c| input.cameras[c.index()].name.as_str()).collect::<Vec<_>>().join(", "),
+                input.cameras[0].name
             )),
         }
     }
@@ -141,7 +161,7 @@ fn on_rig<'a>(
     let layout = Layout::rigid(input, cam_from_rig);
     let empty = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
     let allowed: Vec<bool> = empty.frame_images.iter().map(|images| images.iter().all(|i| !taken[i.index()])).collect();
-    let Some((mut model, tries)) = best_model(&empty, &from_exposures(&empty, &allowed, options), &allowed, options)? else {
+    let Some((mut model, tries)) = best_model(&empty, &from_exposures(&empty, &allowed, &options.growing()), &allowed, options)? else {
         return Ok(None);
     };
     let outcomes = by_image(&model, &tries);

@@ -21,7 +21,7 @@ pub struct LoopOptions {
 
 impl Default for LoopOptions {
     fn default() -> Self {
-        Self { per_image: 20, window: 10, spread: 5 }
+        Self { per_image: 10, window: 10, spread: 5 }
     }
 }
 

@@ -35,7 +35,11 @@ pub fn input(survey: &Survey) -> MapInput {
         exposure: truth.frames[image.frame.index()].exposure,
     };
     MapInput {
-        cameras: truth.cameras.iter().map(|&camera| CameraInput { camera, fixed: true, alternatives: Vec::new() }).collect(),
+        cameras: truth
+            .cameras
+            .iter()
+            .map(|&camera| CameraInput { name: "camera".into(), camera, fixed: true, alternatives: Vec::new() })
+            .collect(),
         images: truth.images.iter().map(image).collect(),
         keypoints: truth.keypoints.clone(),
         pairs: survey.pairs.clone(),

@@ -7,12 +7,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum FormatError {
     /// The operating system refused a file of a directory.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     File {
         /// Which file.
         path: PathBuf,
         /// Its reason.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// Writing to, or reading from, a stream failed.
     #[error("input or output failed: {0}")]
@@ -50,6 +50,6 @@ pub enum FormatError {
 impl FormatError {
     pub(super) fn file(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
-        move |source| Self::File { path, source }
+        move |cause| Self::File { path, cause }
     }
 }
