@@ -46,7 +46,10 @@ pub const REPORT_KEYS: &[(&str, &str)] = &[
     ("baselines[].normalised_residual", "root mean square of (found - given) / sigma"),
     ("scale_bars[].name", "name of a known length in the scene"),
     ("scale_bars[].given_m", "the given length, metres"),
-    ("scale_bars[].found_m", "the length found, metres; null when an end is seen in fewer than two oriented images"),
+    (
+        "scale_bars[].found_m",
+        "the length between its ends as picked in the oriented images, metres; null when an end is picked in fewer than two of them",
+    ),
     ("scale_bars[].error_m", "found less given, metres"),
     ("scale_bars[].check", "whether it was held out"),
     ("dense.quality", "resolution of the depth maps: low, medium, high"),

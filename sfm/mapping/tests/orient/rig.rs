@@ -2,7 +2,7 @@
 
 use crate::exact::adjusted_truth;
 use crate::support::{assert_near_optimum, baseline, made, noisy, oriented, rig_poses, true_baseline};
-use mapping::{MapInput, RigInput, RigMode};
+use mapping::{MapInput, OrientOptions, RigInput, RigMode, orient};
 use scene::{CameraId, Scale};
 use synthetic::Alignment;
 use synthetic::survey::{Survey, SurveyOptions};
@@ -105,4 +105,23 @@ fn a_rig_of_which_one_pose_is_given_keeps_it() {
     assert_eq!(out.models[0].scale, Scale::Metric);
     assert_eq!(out.models[0].rigs[0].sensors[1], made.truth.rigs[0].sensors[1]);
     assert_near_optimum(&out.models[0], &adjusted_truth(&made.truth, &input, false, true), &made.truth, Alignment::Se3);
+}
+
+#[test]
+fn a_rig_that_cannot_be_solved_still_uses_the_baseline_of_every_exposure() {
+    let (made, mut input) = made(&noisy(3));
+    // The third camera was dark.
+    let dark = |image: scene::ImageId| made.truth.images[image.index()].camera == CameraId(2);
+    input.pairs.retain(|pair| !dark(pair.images.0) && !dark(pair.images.1));
+    let length = true_baseline(&made.truth, (CameraId(0), CameraId(1)), 0).expect("both took it");
+    let residual = |mode| {
+        let rig = RigInput { mode, poses: Vec::new(), baselines: vec![baseline(length, 0.001)] };
+        let out = orient(&MapInput { rig, ..input.clone() }, &OrientOptions::default()).expect("two cameras overlap");
+        assert_eq!((out.models[0].scale, out.models[0].oriented_images().count()), (Scale::Metric, 24));
+        (out.summary.baselines[0].normalised_residual, out.summary.notes)
+    };
+    let ((as_rig, notes), (as_baselines, none)) = (residual(RigMode::Rigid), residual(RigMode::Baselines));
+    assert!(notes.len() == 1 && notes[0].contains("the rig stays unknown") && none.is_empty(), "{notes:?} {none:?}");
+    // The same observations: the same adjustment, but for where it stopped.
+    assert!((as_rig - as_baselines).abs() < 0.01 * as_baselines, "{as_rig} {as_baselines}");
 }
