@@ -202,3 +202,22 @@ fn every_example_is_read() {
     }
     assert!(count >= 6, "{count} examples");
 }
+
+/// What a variable holds is a path, not a pattern; a calibration for another aspect is an error of the file, told before the work.
+#[test]
+fn variables_are_paths_and_calibrations_must_fit() {
+    let dive = Dive::empty();
+    std::fs::create_dir_all(dive.path("dive [2024]")).unwrap();
+    for i in 0..2 {
+        std::fs::write(dive.path(&format!("dive [2024]/{i}.png")), png(64, 48, i)).unwrap();
+    }
+    dive.write("dive.toml", "[[camera]]\nimages = \"${HERE}/*.png\"\n");
+    let run = |dive: &Dive| dive.command(&["run", "--until", "features"]).env("HERE", dive.path("dive [2024]")).output().unwrap();
+    let output = run(&dive);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    dive.write("dive.toml", "[dive]\noutput = \"other\"\n[[camera]]\nimages = \"${HERE}\"\ninterior = { model = \"pinhole\", width = 48, height = 64, fx = 50, fy = 50 }\n");
+    let output = run(&dive);
+    assert_eq!(output.status.code(), Some(2));
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(stderr.contains("ingest") && stderr.contains("another aspect") && !stderr.contains("features"), "{stderr}");
+}

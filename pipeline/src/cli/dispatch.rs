@@ -3,7 +3,7 @@
 use super::args::{Cli, Command};
 use super::{eval, help, init, run, status, synth};
 use crate::config::ConfigError;
-use crate::error::NoResult;
+use crate::error::{Misfit, NoResult};
 use anyhow::Context;
 use clap::Parser;
 use std::io::{ErrorKind, Write};
@@ -39,7 +39,7 @@ pub fn main() -> ExitCode {
 }
 
 fn exit_code(error: &anyhow::Error) -> ExitCode {
-    if error.chain().any(|e| e.is::<ConfigError>() || e.is::<super::help::NoTopic>()) {
+    if error.chain().any(|e| e.is::<ConfigError>() || e.is::<Misfit>() || e.is::<super::help::NoTopic>()) {
         ExitCode::from(USAGE)
     } else if error.chain().any(|e| e.is::<NoResult>()) {
         ExitCode::from(NO_RESULT)

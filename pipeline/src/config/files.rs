@@ -17,10 +17,10 @@ pub(super) enum NoFiles {
     Nothing,
 }
 
-/// The files that a folder (all images in it) or a pattern (everything it matches) names, in natural order.
-pub(super) fn image_files(base: &Path, images: &str) -> Result<Vec<PathBuf>, NoFiles> {
+/// The files that a folder (all images in it) or else a pattern (everything it matches) names, in natural order.
+pub(super) fn image_files(base: &Path, images: &str, pattern: &str) -> Result<Vec<PathBuf>, NoFiles> {
     let path = base.join(images);
-    let mut files = if path.is_dir() { images_in(&path)? } else { matching(base, images)? };
+    let mut files = if path.is_dir() { images_in(&path)? } else { matching(base, pattern)? };
     files.sort_by(|a, b| natural_order(a, b));
     if files.is_empty() { Err(NoFiles::Nothing) } else { Ok(files) }
 }
@@ -111,9 +111,9 @@ mod tests {
         }
         let names =
             |found: Vec<PathBuf>| -> Vec<String> { found.iter().map(|p| p.file_name().unwrap().to_string_lossy().into_owned()).collect() };
-        assert_eq!(names(image_files(folder.path(), ".").unwrap()), ["b2.JPG", "b10.jpg"]);
-        assert_eq!(names(image_files(folder.path(), "*").unwrap()).len(), 3);
-        assert!(matches!(image_files(folder.path(), "*.png"), Err(NoFiles::Nothing)));
-        assert!(matches!(image_files(folder.path(), "[.png"), Err(NoFiles::Pattern(_))));
+        assert_eq!(names(image_files(folder.path(), ".", ".").unwrap()), ["b2.JPG", "b10.jpg"]);
+        assert_eq!(names(image_files(folder.path(), "*", "*").unwrap()).len(), 3);
+        assert!(matches!(image_files(folder.path(), "*.png", "*.png"), Err(NoFiles::Nothing)));
+        assert!(matches!(image_files(folder.path(), "[.png", "[.png"), Err(NoFiles::Pattern(_))));
     }
 }

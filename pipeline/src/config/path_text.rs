@@ -4,18 +4,29 @@ use serde::{Deserialize, Deserializer, de};
 
 /// A path or pattern in which `${NAME}` was replaced by the value of the environment variable NAME.
 #[derive(Clone, Debug)]
-pub(super) struct PathText(String);
+pub(super) struct PathText {
+    path: String,
+    /// With the values escaped: what they hold is meant as it stands.
+    pattern: String,
+}
 
 impl PathText {
     pub(super) fn as_str(&self) -> &str {
-        &self.0
+        &self.path
+    }
+
+    pub(super) fn as_pattern(&self) -> &str {
+        &self.pattern
     }
 }
 
 impl<'de> Deserialize<'de> for PathText {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let written = String::deserialize(deserializer)?;
-        expand(&written, |name| std::env::var(name).ok()).map(Self).map_err(de::Error::custom)
+        let value = |name: &str| std::env::var(name).ok();
+        let path = expand(&written, value).map_err(de::Error::custom)?;
+        let pattern = expand(&written, |name| value(name).map(|v| glob::Pattern::escape(&v))).map_err(de::Error::custom)?;
+        Ok(Self { path, pattern })
     }
 }
 

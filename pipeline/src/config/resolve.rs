@@ -164,7 +164,7 @@ fn images(source: &mut Source<'_>, camera: &RawCamera, entry: Range<usize>, fold
                     source.problem(Some(place.span()), &format!("camera.{key}"), "only a video has it", None);
                 }
             }
-            let (message, hint) = match image_files(folder, images.get_ref().as_str()) {
+            let (message, hint) = match image_files(folder, images.get_ref().as_str(), images.get_ref().as_pattern()) {
                 Ok(files) => return Some(ImageSource::Files(files)),
                 Err(NoFiles::Pattern(message)) => (format!("is not a pattern: {message}"), None),
                 Err(NoFiles::Unreadable(message)) => (format!("cannot be searched: {message}"), None),

@@ -2,9 +2,10 @@
 
 use super::images::{CameraEntry, ImageList};
 use crate::config::{Config, InteriorConfig};
+use crate::error::Misfit;
 use crate::store::Warning;
 use ::features::{InteriorEstimate, PairForInterior, interior_from_pairs};
-use anyhow::{Result, bail};
+use anyhow::Result;
 use scene::camera::ParamKind;
 use scene::{Camera, ImageId, Keypoint, VerifiedPair};
 use serde::Serialize;
@@ -139,13 +140,12 @@ fn given(interior: &InteriorConfig, entry: &CameraEntry, (width, height): (u32, 
     }
     let aspect = |(w, h): (u32, u32)| f64::from(w) / f64::from(h);
     if (aspect(size) / aspect((width, height)) - 1.0).abs() > ASPECT_TOLERANCE {
-        bail!(
+        let message = format!(
             "the calibration of camera {} is for {} x {} pixels, its images have {width} x {height}: another aspect, so they are cut or turned\n  \
              hint: calibrate with images of the size that is used",
-            entry.name,
-            size.0,
-            size.1
+            entry.name, size.0, size.1
         );
+        return Err(Misfit(message).into());
     }
     let message = format!("its calibration is for {} x {} pixels; it was scaled to the images' {width} x {height}", size.0, size.1);
     warnings.push(Warning { about: entry.name.clone(), message });
