@@ -47,7 +47,7 @@ impl Start {
     /// Whether the values come from a calibration or from EXIF, not from a guess.
     #[must_use]
     pub fn is_known(&self) -> bool {
-        matches!(self.origin, Origin::Given | Origin::Exif)
+        self.origin != Origin::Guess
     }
 }
 

@@ -3,6 +3,7 @@
 mod error;
 mod matching;
 pub mod pairs;
+mod random;
 mod retrieval;
 mod sift;
 mod verify;

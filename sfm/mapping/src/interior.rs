@@ -22,6 +22,7 @@ const MAX_ASPECT: f64 = 1.2;
 
 /// What a small model from one start tells.
 struct Trial {
+    /// What it started from.
     cameras: Vec<Camera>,
     plausible: bool,
     observations: usize,
@@ -46,7 +47,7 @@ pub(crate) fn best_interior(empty: &Model, allowed: &[bool], options: &OrientOpt
                 *camera = input.alternatives.get(k - 1).copied().unwrap_or(*camera);
             }
         }
-        trials.extend(trial(&model, allowed, options)?.map(|trial| Trial { cameras: model.cameras, ..trial }));
+        trials.extend(trial(&model, allowed, options)?);
     }
     // One that ran off to what cannot be may fit more, loosely.
     let any_plausible = trials.iter().any(|t| t.plausible);
@@ -86,7 +87,7 @@ fn trial(empty: &Model, allowed: &[bool], options: &OrientOptions) -> Result<Opt
     }
     let used = |c: usize| model.oriented_images().iter().any(|i| model.images[i.index()].camera.index() == c);
     let plausible = model.cameras.iter().enumerate().all(|(c, camera)| !used(c) || is_plausible(camera));
-    Ok((count > 0).then(|| Trial { cameras: Vec::new(), plausible, observations: count, mean_square_px: sum / count as f64 }))
+    Ok((count > 0).then(|| Trial { cameras: empty.cameras.clone(), plausible, observations: count, mean_square_px: sum / count as f64 }))
 }
 
 /// Whether a lens can be like this.

@@ -2,9 +2,10 @@
 
 use super::RetrievalOptions;
 use super::hamming::Signature;
-use super::kmeans::{SplitMix64, assign, kmeans};
+use super::kmeans::{assign, kmeans};
 use crate::FeatureError;
 use crate::matching::nearest;
+use crate::random::SplitMix64;
 use rayon::prelude::*;
 use scene::Descriptor;
 

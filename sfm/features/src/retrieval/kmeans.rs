@@ -1,28 +1,12 @@
 //! K-means on descriptors, in integers.
 
 use crate::matching::nearest;
+use crate::random::SplitMix64;
 use rayon::prelude::*;
 use scene::Descriptor;
 
 /// Descriptors of one task; sums are integers, so it is for speed alone.
 const TASK: usize = 4096;
-
-/// Pseudo-random numbers: SplitMix64 (Steele, Lea & Flood, OOPSLA 2014).
-pub(super) struct SplitMix64(pub u64);
-
-impl SplitMix64 {
-    pub(super) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Below `n`, which is not 0; the bias of at most n / 2^64 does not matter here.
-    fn below(&mut self, n: usize) -> usize {
-        ((u128::from(self.next()) * n as u128) >> 64) as usize
-    }
-}
 
 /// The nearest centre of each descriptor, the lowest on ties.
 pub(super) fn assign(descriptors: &[Descriptor], centres: &[Descriptor]) -> Vec<u32> {

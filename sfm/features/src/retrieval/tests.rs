@@ -1,8 +1,9 @@
 //! Vocabularies and votes against their definitions.
 
 use super::hamming::{Popcount, Signature};
-use super::kmeans::{SplitMix64, kmeans};
+use super::kmeans::kmeans;
 use super::*;
+use crate::random::SplitMix64;
 use proptest::prelude::*;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

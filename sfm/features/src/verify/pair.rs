@@ -5,6 +5,7 @@ use super::coherent::coherent;
 use super::models::{Epipolar, Fit, Pixels, homography};
 use super::still::{along_the_border, still};
 use super::verdict::{ImageForPair, PairVerdict, Rejection};
+use crate::random;
 use scene::{KeypointIndex, PairConfiguration, VerifiedPair};
 
 /// Matches that are enough to tell whether a fundamental matrix explains more than an essential one.
@@ -45,12 +46,9 @@ pub fn verify_pair(
     pair.verdict()
 }
 
-/// A stream of its own for each pair: the finaliser of SplitMix64 (Steele, Lea & Flood, OOPSLA 2014).
+/// A stream of its own for each pair.
 fn pair_seed(seed: u64, a: u32, b: u32) -> u64 {
-    let mut z = seed.wrapping_add((u64::from(a) << 32 | u64::from(b)).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
+    random::mix(seed.wrapping_add((u64::from(a) << 32 | u64::from(b)).wrapping_mul(random::STEP)))
 }
 
 struct Pair<'a> {
