@@ -5,9 +5,11 @@
 
 mod distortion;
 mod model;
+mod port;
 mod projection;
 #[cfg(test)]
 mod tests;
 
 pub use model::{Camera, CameraError, CameraModel, MAX_CAMERA_PARAMS, ParamKind};
+pub use port::FlatPort;
 pub use projection::ProjectionJacobians;
