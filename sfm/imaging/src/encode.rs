@@ -13,6 +13,15 @@ pub fn encode_png_grey(raster: &Raster<u8>) -> Result<Vec<u8>, ImagingError> {
     encode(raster, ImageFormat::Png, |out, w, h| PngEncoder::new(out).write_image(raster.data(), w, h, ExtendedColorType::L8))
 }
 
+/// A grey PNG of 16 bits.
+///
+/// # Errors
+/// [`ImagingError::Encode`] for a raster without pixels.
+pub fn encode_png_grey16(raster: &Raster<u16>) -> Result<Vec<u8>, ImagingError> {
+    let bytes: Vec<u8> = raster.data().iter().flat_map(|v| v.to_ne_bytes()).collect();
+    encode(raster, ImageFormat::Png, |out, w, h| PngEncoder::new(out).write_image(&bytes, w, h, ExtendedColorType::L16))
+}
+
 /// An RGB PNG of 8 bits a channel.
 ///
 /// # Errors
@@ -70,6 +79,14 @@ mod tests {
         assert_eq!(encode_png_rgb(&rgb).expect("valid"), bytes, "same pixels, same bytes");
         let mask = rgb.map(|p| if p[0] > 100 { 255 } else { 0 });
         assert_eq!(decode_grey_u8(&encode_png_grey(&mask).expect("valid")).expect("valid"), mask);
+    }
+
+    #[test]
+    fn png_keeps_sixteen_bits() {
+        let depth = gradient().map(|p| u16::from(p[0]) * 257 + u16::from(p[1]));
+        let bytes = encode_png_grey16(&depth).expect("valid");
+        let back = image::load_from_memory(&bytes).expect("a PNG").into_luma16();
+        assert_eq!(back.as_raw(), depth.data());
     }
 
     #[test]

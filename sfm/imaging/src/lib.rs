@@ -21,7 +21,7 @@ pub mod video;
 pub use blur::{gaussian_blur, gaussian_kernel};
 pub use colour::grey_from_rgb;
 pub use decode::{MAX_PIXELS, decode_grey, decode_grey_u8, decode_rgb, probe};
-pub use encode::{encode_jpeg_rgb, encode_png_grey, encode_png_rgb};
+pub use encode::{encode_jpeg_rgb, encode_png_grey, encode_png_grey16, encode_png_rgb};
 pub use error::ImagingError;
 pub use exif::{ExifInfo, FocalEstimate, FocalRule};
 pub use format::{ImageFormat, ImageInfo};
