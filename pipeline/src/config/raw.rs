@@ -133,6 +133,7 @@ pub(super) struct RawMask {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawFeatures {
+    pub(super) method: Place<String>,
     pub(super) max_keypoints: Place<u32>,
     pub(super) double_up_to_mpx: Place<f64>,
     pub(super) contrast_threshold: Place<f64>,
@@ -145,6 +146,7 @@ pub(super) struct RawMatching {
     pub(super) exhaustive_up_to: Place<u32>,
     pub(super) overlap: Place<u32>,
     pub(super) ratio: Place<f64>,
+    pub(super) min_correlation: Place<f64>,
     pub(super) max_error_px: Place<f64>,
     pub(super) min_inliers: Place<u32>,
 }

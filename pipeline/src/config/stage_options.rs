@@ -77,9 +77,21 @@ pub struct IpConfig {
     pub min_texture: f64,
 }
 
+/// How distinctive points are found and matched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FeatureMethod {
+    /// Scale-invariant features, matched by their descriptors.
+    Sift,
+    /// Harris corners, matched by the correlation of the grey values about them.
+    HarrisNcc,
+}
+
 /// Options of the stage `features`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FeaturesConfig {
+    /// How points are found.
+    pub method: FeatureMethod,
     /// Most keypoints an image.
     pub max_keypoints: u32,
     /// Images of at most so many megapixels are doubled first.
@@ -111,6 +123,8 @@ pub struct MatchingConfig {
     pub overlap: u32,
     /// Largest ratio of the distances to the nearest and the next descriptor.
     pub ratio: f64,
+    /// Least correlation of a match.
+    pub min_correlation: f64,
     /// Largest residual of an inlier, pixels.
     pub max_error_px: f64,
     /// Fewer inliers are no pair.

@@ -5,8 +5,8 @@ use super::model::CameraConfig;
 use super::path_text::PathText;
 use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport};
 use super::stage_options::{
-    DenseQuality, DensifyConfig, EvaluateConfig, FeaturesConfig, IpConfig, MaskConfig, MaskStrategy, MatchingConfig, OrientConfig,
-    PairRule, Polarity, ReportConfig,
+    DenseQuality, DensifyConfig, EvaluateConfig, FeatureMethod, FeaturesConfig, IpConfig, MaskConfig, MaskStrategy, MatchingConfig,
+    OrientConfig, PairRule, Polarity, ReportConfig,
 };
 use super::values::Values;
 use std::path::Path;
@@ -73,7 +73,9 @@ fn flag(value: &Option<Spanned<bool>>, default: bool) -> bool {
 pub(super) fn features(source: &mut Source<'_>, raw: &RawFeatures) -> FeaturesConfig {
     let (mut values, default) = (Values { source }, ::features::SiftOptions::default());
     let contrast = f64::from(default.contrast_threshold);
+    let methods = [("sift", FeatureMethod::Sift), ("harris-ncc", FeatureMethod::HarrisNcc)];
     FeaturesConfig {
+        method: values.choice("features.method", &raw.method, &methods).unwrap_or(FeatureMethod::Sift),
         max_keypoints: values.count("features.max_keypoints", &raw.max_keypoints, 100, 100_000, default.max_features as u32),
         double_up_to_mpx: values.within("features.double_up_to_mpx", &raw.double_up_to_mpx, 0.0, 1000.0, DOUBLE_UP_TO_MPX),
         contrast_threshold: values.within("features.contrast_threshold", &raw.contrast_threshold, 1e-6, 1.0, contrast),
@@ -84,12 +86,14 @@ pub(super) fn matching(source: &mut Source<'_>, raw: &RawMatching) -> MatchingCo
     let mut values = Values { source };
     let (matches, verify) = (::features::MatchOptions::default(), ::features::VerifyOptions::default());
     let ratio = (f64::from(matches.max_ratio) * 1e6).round() / 1e6;
+    let correlation = ::features::NccOptions::default().min_correlation;
     let rules = [("auto", PairRule::Auto), ("exhaustive", PairRule::Exhaustive), ("sequential", PairRule::Sequential)];
     MatchingConfig {
         pairs: values.choice("matching.pairs", &raw.pairs, &rules).unwrap_or(PairRule::Auto),
         exhaustive_up_to: values.count("matching.exhaustive_up_to", &raw.exhaustive_up_to, 0, 100_000, 200),
         overlap: values.count("matching.overlap", &raw.overlap, 1, 10_000, 10),
         ratio: values.within("matching.ratio", &raw.ratio, 0.1, 1.0, ratio),
+        min_correlation: values.within("matching.min_correlation", &raw.min_correlation, 0.0, 1.0, correlation),
         max_error_px: values.within("matching.max_error_px", &raw.max_error_px, 0.1, 100.0, verify.max_error_px),
         min_inliers: values.count("matching.min_inliers", &raw.min_inliers, 8, 10_000, verify.min_inliers as u32),
     }

@@ -156,6 +156,7 @@ fn defaults() {
     assert_eq!((config.name.as_str(), config.frames_from), ("dive", FramesFrom::Order));
     assert_eq!(config.output.file_name().unwrap(), "out");
     assert_eq!((config.rig.mode, config.mask.strategy), (RigMode::None, MaskStrategy::None));
+    assert_eq!((config.features.method, config.matching.min_correlation), (FeatureMethod::Sift, 0.8));
     assert_eq!((config.features.max_keypoints, config.features.double_up_to_mpx), (8192, 2.1));
     // As docs/dive-toml.md states them; they come from the packages.
     assert_eq!((config.matching.ratio, config.matching.max_error_px, config.matching.min_inliers), (0.8, 4.0, 15));

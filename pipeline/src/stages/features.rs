@@ -2,15 +2,15 @@
 
 use super::images::{ImageEntry, ImageList};
 use super::mask;
-use crate::config::Config;
+use crate::config::{Config, FeatureMethod, FeaturesConfig};
 use crate::error::NoResult;
 use crate::formats::{StoredFeatures, read_features, write_features};
 use crate::stage::{Outcome, Stage, Work, no_inputs};
 use crate::store::{Fingerprint, Warning};
 use anyhow::{Context, Result};
-use features::SiftOptions;
+use features::{FeatureError, HarrisOptions, SiftOptions};
 use rayon::prelude::*;
-use scene::{Keypoint, Mask, Raster};
+use scene::{Features, Keypoint, Mask, Raster};
 use serde_json::{Value, json};
 
 /// The stage.
@@ -124,15 +124,27 @@ fn decode(bytes: &[u8]) -> Result<(Raster<f32>, Raster<[u8; 3]>), imaging::Imagi
     Ok((grey, rgb))
 }
 
+/// The features of an image by the method that was asked for.
+fn find(config: &FeaturesConfig, grey: &Raster<f32>, mask: Option<&Mask>) -> Result<Features, FeatureError> {
+    match config.method {
+        FeatureMethod::Sift => {
+            let options = SiftOptions {
+                max_features: config.max_keypoints as usize,
+                double_image: (grey.width() * grey.height()) as f64 <= 1e6 * config.double_up_to_mpx,
+                contrast_threshold: config.contrast_threshold as f32,
+                ..SiftOptions::default()
+            };
+            features::extract(grey, mask, &options)
+        }
+        FeatureMethod::HarrisNcc => {
+            let options = HarrisOptions { max_features: config.max_keypoints as usize, ..HarrisOptions::default() };
+            features::extract_harris(grey, mask, &options)
+        }
+    }
+}
+
 fn extract(work: &Work<'_>, grey: &Raster<f32>, rgb: &Raster<[u8; 3]>, mask: Option<&Mask>) -> Result<StoredFeatures> {
-    let config = &work.config.features;
-    let options = SiftOptions {
-        max_features: config.max_keypoints as usize,
-        double_image: (grey.width() * grey.height()) as f64 <= 1e6 * config.double_up_to_mpx,
-        contrast_threshold: config.contrast_threshold as f32,
-        ..SiftOptions::default()
-    };
-    let features = features::extract(grey, mask, &options)?;
+    let features = find(&work.config.features, grey, mask)?;
     let colour = |k: &Keypoint| rgb.at_point(f64::from(k.x), f64::from(k.y)).copied().unwrap_or_default();
     let colours = features.keypoints.iter().map(colour).collect();
     Ok(StoredFeatures { features, colours })

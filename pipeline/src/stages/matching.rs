@@ -4,12 +4,12 @@ use super::features;
 use super::images::ImageList;
 use super::interior::{self, Start};
 use super::loops;
-use crate::config::{Config, PairRule};
+use crate::config::{Config, FeatureMethod, PairRule};
 use crate::error::NoResult;
 use crate::formats::{StoredFeatures, read_matches, write_matches};
 use crate::stage::{Outcome, Stage, Work, no_inputs};
 use crate::store::Fingerprint;
-use ::features::{ImageForPair, MatchOptions, PairVerdict, VerifyOptions};
+use ::features::{ImageForPair, MatchOptions, NccOptions, PairVerdict, VerifyOptions};
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 use scene::{ImageId, PairConfiguration, VerifiedPair};
@@ -25,7 +25,7 @@ const ROWS_AT_ONCE: usize = 2;
 const PARTNERS_AT_ONCE: usize = 256;
 
 fn options(config: &Config) -> Value {
-    json!({"matching": config.matching, "interior": interior::options(config)})
+    json!({"matching": config.matching, "method": config.features.method, "interior": interior::options(config)})
 }
 
 /// Where the pairs of an image with later ones lie.
@@ -128,7 +128,7 @@ impl Matcher<'_> {
     /// What the pairs of a row are made from.
     fn key(&self, row: usize, partners: &[usize]) -> Result<Fingerprint> {
         let config = self.work.config;
-        let options = json!(config.matching).to_string();
+        let options = json!([config.matching, config.features.method]).to_string();
         let mut parts: Vec<(&str, Vec<u8>)> = vec![("version", STAGE.version.to_le_bytes().to_vec()), ("options", options.into_bytes())];
         for &image in std::iter::once(&row).chain(partners) {
             let entry = &self.list.images[image];
@@ -187,11 +187,16 @@ impl Matcher<'_> {
     fn pair(&self, images: (usize, usize), stored: (&StoredFeatures, &StoredFeatures)) -> Option<VerifiedPair> {
         let config = &self.work.config.matching;
         let (first, second) = (&stored.0.features, &stored.1.features);
-        let tentative = ::features::match_descriptors(
-            &first.descriptors,
-            &second.descriptors,
-            &MatchOptions { max_ratio: config.ratio as f32, ..MatchOptions::default() },
-        );
+        let tentative = match self.work.config.features.method {
+            FeatureMethod::Sift => {
+                let options = MatchOptions { max_ratio: config.ratio as f32, ..MatchOptions::default() };
+                ::features::match_descriptors(&first.descriptors, &second.descriptors, &options)
+            }
+            FeatureMethod::HarrisNcc => {
+                let options = NccOptions { min_correlation: config.min_correlation, ..NccOptions::default() };
+                ::features::match_guided(first, second, &options)
+            }
+        };
         let side = |image: usize, features| {
             let start = &self.starts[self.list.images[image].camera];
             ImageForPair { id: ImageId::new(image), camera: &start.camera, camera_known: start.is_known(), features }

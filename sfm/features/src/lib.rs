@@ -1,6 +1,7 @@
 //! Features of images: extraction, matching and geometric verification.
 
 mod error;
+mod harris;
 mod matching;
 pub mod pairs;
 mod random;
@@ -9,6 +10,7 @@ mod sift;
 mod verify;
 
 pub use error::FeatureError;
+pub use harris::{HarrisOptions, NccOptions, extract_harris, match_guided};
 pub use matching::{MatchOptions, match_descriptors};
 pub use retrieval::{Codebook, GlobalDescriptor, RetrievalOptions};
 pub use sift::{SiftOptions, extract};
