@@ -14,7 +14,7 @@ const NO_RESULT: i32 = 3;
 
 /// A rendered dive of two cameras, with a dive.toml that orients it.
 fn good_dive() -> Dive {
-    let (dive, _) = Dive::rendered(&DiveOptions { exposures: 6, width: 400, height: 250, ..DiveOptions::default() });
+    let (dive, _) = Dive::rendered(&DiveOptions::small(6, 400, 250));
     dive.write("dive.toml", "[[camera]]\nimages = \"frames/C1\"\n[[camera]]\nimages = \"frames/C2\"\n");
     dive
 }
@@ -67,7 +67,7 @@ fn two_identical_images_give_no_result() {
 /// The same pixels in files that differ: the position is not known, and is not made up.
 #[test]
 fn two_images_from_one_place_give_no_result() {
-    let (dive, rendered) = Dive::rendered(&DiveOptions { exposures: 1, width: 320, height: 200, ..DiveOptions::default() });
+    let (dive, rendered) = Dive::rendered(&DiveOptions::small(1, 320, 200));
     let rgb = &rendered.images[0].rgb;
     std::fs::remove_dir_all(dive.path("frames")).unwrap();
     std::fs::create_dir(dive.path("frames")).unwrap();
@@ -96,7 +96,7 @@ fn images_of_different_places_give_no_result() {
 #[test]
 fn bad_files_among_good_ones_are_warnings() {
     let dive = good_dive();
-    let (_, rendered) = Dive::rendered(&DiveOptions { exposures: 1, width: 400, height: 250, ..DiveOptions::default() });
+    let (_, rendered) = Dive::rendered(&DiveOptions::small(1, 400, 250));
     let jpeg = imaging::encode_jpeg_rgb(&rendered.images[1].rgb, 90).unwrap();
     let files: [(&str, Vec<u8>); 5] = [
         ("x1-truncated.jpg", jpeg[..jpeg.len() / 2].to_vec()),

@@ -12,15 +12,15 @@ use synthetic::dive::DiveOptions;
 /// A baseline makes the model metric; poses, lengths and cloud agree with the truth; every figure is explained.
 #[test]
 fn a_rendered_dive_comes_out_as_it_is() {
-    let (dive, rendered) = Dive::rendered(&DiveOptions { exposures: 6, width: 480, height: 300, ..DiveOptions::default() });
-    let truth = rendered.truth("png");
+    let (dive, rendered) = Dive::rendered(&DiveOptions::small(6, 480, 300));
+    let truth = rendered.scene.truth("png");
     let mut positions = String::new();
     for (i, image) in truth.images.iter().enumerate() {
         let centre = truth.cam_from_world(scene::ImageId::new(i)).unwrap().centre();
         writeln!(positions, "{} {} {} {}", image.name, centre.x, centre.y, centre.z).unwrap();
     }
     dive.write("positions.txt", &positions);
-    let baseline = rendered.cam_from_rig[1].centre().norm();
+    let baseline = rendered.scene.cameras[1].cam_from_rig.centre().norm();
     dive.write(
         "dive.toml",
         &format!(
@@ -70,4 +70,28 @@ fn a_rendered_dive_comes_out_as_it_is() {
     dive.write("dive.toml", &text.replace("quality = \"low\"", "quality = \"medium\""));
     let changed = stages(dive.ok(&["status"]));
     assert_eq!(&changed[4..], ["orient done", "densify stale", "evaluate stale", "report stale"]);
+}
+
+/// The second feature method goes the whole way to oriented images, and loops are looked for with its descriptors.
+#[test]
+fn harris_corners_orient_a_dive() {
+    let mut options = DiveOptions::small(8, 480, 300);
+    options.motion.arc_deg = 40.0;
+    let (dive, rendered) = Dive::rendered(&options);
+    let baseline = rendered.scene.cameras[1].cam_from_rig.centre().norm();
+    let cameras = "[[camera]]\nimages = \"frames/C1\"\n[[camera]]\nimages = \"frames/C2\"\n";
+    let rig = format!("[[rig.baseline]]\nbetween = [\"C1\", \"C2\"]\nlength_m = {baseline}\n");
+    let rest = "[features]\nmethod = \"harris-ncc\"\n[matching]\npairs = \"sequential\"\noverlap = 3\n";
+    dive.write("dive.toml", &format!("{cameras}{rig}{rest}"));
+    let printed: Value = serde_json::from_str(&dive.ok(&["run", "--until", "orient", "--json"])).unwrap();
+    assert_eq!(printed["images"]["oriented"], 16, "{printed:#}");
+    assert_eq!(printed["scale"], "metric");
+    assert!(printed["reprojection_rms_px"].as_f64().unwrap() < 1.0);
+    // Another method is other features and matches, not what lies there.
+    dive.write("dive.toml", &format!("{cameras}{rig}{}", rest.replace("harris-ncc", "sift")));
+    let status = dive.ok(&["status", "--json"]);
+    let stages: Value = serde_json::from_str(&status).unwrap();
+    assert!(status.contains("features") && !stages.is_null(), "{status}");
+    let sift: Value = serde_json::from_str(&dive.ok(&["run", "--until", "matching", "--json"])).unwrap();
+    assert_ne!(sift["features"]["keypoints"], printed["features"]["keypoints"]);
 }

@@ -12,7 +12,7 @@ use synthetic::dive::DiveOptions;
 
 /// Two cameras, small enough for twenty runs, large enough to be oriented.
 fn dive() -> Dive {
-    let (dive, _) = Dive::rendered(&DiveOptions { exposures: 4, width: 320, height: 200, ..DiveOptions::default() });
+    let (dive, _) = Dive::rendered(&DiveOptions::small(4, 320, 200));
     let cameras = "[[camera]]\nimages = \"frames/C1\"\n[[camera]]\nimages = \"frames/C2\"\n";
     let baseline = "[[rig.baseline]]\nbetween = [\"C1\", \"C2\"]\nlength_m = 0.4\n";
     for output in ["one", "two", "killed"] {

@@ -55,7 +55,7 @@ fn nearest<'a>(ours: &'a [Keypoint], reference: &Reference) -> Option<(&'a Keypo
 
 #[test]
 fn keypoints_are_those_of_opencv() {
-    let dive = render_dive(&DiveOptions { exposures: 2, width: 640, height: 400, ..DiveOptions::default() });
+    let dive = render_dive(&DiveOptions::small(2, 640, 400)).unwrap();
     let rgb = &dive.images[0].rgb;
     // Both see the same eight bits.
     let grey = Raster::from_vec(rgb.width(), rgb.height(), rgb.data().iter().map(|p| p[1]).collect()).unwrap();

@@ -7,29 +7,48 @@ mod support;
 use scene::format::{read_colmap_binary, read_ply_mesh};
 use support::{Dive, tree};
 
-const TINY: &[&str] = &["--frames", "2", "--size", "96x64"];
+/// A coarse scene and tiny frames.
+const SCENE: &str = "[world]\ndetail_m = 0.1\nstones = 5\nfish = 2\n[rig]\nwidth = 96\nheight = 64\n[motion]\nframes = 2\n";
+
+fn scene() -> Dive {
+    let dive = Dive::empty();
+    dive.write("scene.toml", SCENE);
+    dive
+}
 
 fn synth<'a>(folder: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    [&["synth", folder], TINY, more].concat()
+    [&["synth", "scene.toml", folder], more].concat()
 }
 
 #[test]
 fn the_same_seed_gives_the_same_bytes_on_one_and_two_threads() {
-    let dive = Dive::empty();
+    let dive = scene();
     dive.ok(&synth("one", &["--threads", "1", "--cameras", "3"]));
     dive.ok(&synth("two", &["--threads", "2", "--cameras", "3"]));
     dive.ok(&synth("other", &["--cameras", "3", "--seed", "8"]));
     let [one, two, other] = ["one", "two", "other"].map(|name| tree(&dive.path(name)));
-    // Six frames and masks, dive.toml, mesh, positions, five files of the model.
-    assert_eq!(one.len(), 20, "{:?}", one.keys());
+    // Six frames, masks, label and depth images; dive.toml, sensors.csv; mesh, seen, positions, frames, bars, optics, labels, scene,
+    // preview; five files of the model.
+    assert_eq!(one.len(), 24 + 2 + 9 + 5, "{:?}", one.keys());
     assert_eq!(one, two);
-    assert_ne!(one["frames/C1/0000.jpg"], other["frames/C1/0000.jpg"]);
+    for file in ["frames/C1/0000.jpg", "sensors.csv", "truth/mesh.ply", "truth/positions.txt"] {
+        assert_ne!(one[file], other[file], "{file}");
+    }
+    // Frames without loss.
+    dive.write("png.toml", &format!("{SCENE}[response]\njpeg_quality = 0\n"));
+    dive.ok(&["synth", "png.toml", "lossless"]);
+    assert!(dive.path("lossless/frames/C1/0000.png").exists());
+    assert!(std::fs::read_to_string(dive.path("lossless/truth/positions.txt")).unwrap().contains("C2/0001.png"));
+    // The settings as written down make the same dive again.
+    std::fs::copy(dive.path("one/truth/scene.toml"), dive.path("again.toml")).unwrap();
+    dive.ok(&["synth", "again.toml", "again", "--preset", "survey"]);
+    assert_eq!(tree(&dive.path("again")), one);
 }
 
 #[test]
 fn what_is_written_runs_and_holds_its_truth() {
-    let dive = Dive::empty();
-    dive.ok(&synth("reef", &["--cameras", "3"]));
+    let dive = scene();
+    dive.ok(&synth("reef", &["--cameras", "3", "--water", "coastal"]));
     let printed: serde_json::Value = serde_json::from_str(&dive.ok(&["run", "reef/dive.toml", "--until", "ingest", "--json"])).unwrap();
     assert_eq!((&printed["images"]["total"], &printed["frames"]["total"]), (&6.into(), &2.into()));
     assert_eq!(printed["warnings"], serde_json::json!([]));
@@ -46,17 +65,38 @@ fn what_is_written_runs_and_holds_its_truth() {
     }
     assert_eq!(config["rig"]["baseline"].as_array().unwrap().len(), 3);
 
-    let (mesh, _) = read_ply_mesh(std::fs::read(dive.path("reef/truth/mesh.ply")).unwrap().as_slice()).unwrap();
-    assert!(!mesh.faces.is_empty());
-    let frame = imaging::decode_rgb(&std::fs::read(dive.path("reef/frames/C3/0001.jpg")).unwrap()).unwrap();
-    let mask = imaging::decode_grey_u8(&std::fs::read(dive.path("reef/truth/masks/C3/0001.png")).unwrap()).unwrap();
+    let mesh = |name: &str| read_ply_mesh(std::fs::read(dive.path(name)).unwrap().as_slice()).unwrap().0;
+    let (all, seen) = (mesh("reef/truth/mesh.ply"), mesh("reef/truth/seen.ply"));
+    assert!(!seen.faces.is_empty() && seen.faces.len() < all.faces.len());
+    let read = |name: &str| std::fs::read(dive.path(name)).unwrap();
+    let frame = imaging::decode_rgb(&read("reef/frames/C3/0001.jpg")).unwrap();
     assert_eq!((frame.width(), frame.height()), (96, 64));
-    assert_eq!((mask.width(), mask.height()), (96, 64));
+    let mask = imaging::decode_grey_u8(&read("reef/truth/masks/C1/0001.png")).unwrap();
+    let labels = imaging::decode_grey_u8(&read("reef/truth/labels/C1/0001.png")).unwrap();
+    for (mask, label) in mask.data().iter().zip(labels.data()) {
+        assert_eq!(*mask == 255, (1..=4).contains(label));
+    }
+
+    // The bars are as long as they are said to be; the sensors were logged before the first exposure and after the last.
+    let bars = String::from_utf8(read("reef/truth/bars.csv")).unwrap();
+    for row in bars.lines().skip(1) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let v: Vec<f64> = cells[2..].iter().map(|c| c.parse().unwrap()).collect();
+        let length = ((v[1] - v[4]).powi(2) + (v[2] - v[5]).powi(2) + (v[3] - v[6]).powi(2)).sqrt();
+        assert!((length - v[0]).abs() < 3e-6, "{row}");
+    }
+    let sensors = String::from_utf8(read("reef/sensors.csv")).unwrap();
+    let times: Vec<f64> = sensors.lines().skip(1).map(|l| l.split(',').next().unwrap().parse().unwrap()).collect();
+    assert!(times[0] < -1.0 && *times.last().unwrap() > 1.0);
+    // Sea water at 19 degrees and 35 ppt.
+    let index: f64 =
+        String::from_utf8(read("reef/truth/frames.csv")).unwrap().lines().nth(1).unwrap().rsplit(',').next().unwrap().parse().unwrap();
+    assert!((1.340..1.343).contains(&index), "{index}");
 }
 
 #[test]
 fn a_folder_that_holds_something_is_left_alone() {
-    let dive = Dive::empty();
+    let dive = scene();
     std::fs::create_dir(dive.path("mine")).unwrap();
     dive.write("mine/notes.txt", "mine");
     let (code, message) = dive.fails(&synth("mine", &[]));
@@ -69,14 +109,16 @@ fn a_folder_that_holds_something_is_left_alone() {
 
 #[test]
 fn bad_options_exit_with_2_and_a_hint() {
-    let dive = Dive::empty();
+    let dive = scene();
     let bad = [
         (["--frames", "1"], "2..=9999"),
-        (["--cameras", "4"], "2..=3"),
+        (["--cameras", "4"], "1..=3"),
         (["--size", "640"], "for example 960x600"),
         (["--size", "0x600"], "from 64 to 8192"),
         (["--noise", "nan"], "from 0 to 100"),
-        (["--water", "tea"], "clear, none"),
+        (["--water", "tea"], "clear, coastal, turbid, none"),
+        (["--port", "round"], "flat, none"),
+        (["--preset", "moon"], "demo, survey, calibration, tank"),
     ];
     for (options, hint) in bad {
         let (code, message) = dive.fails(&[&["synth", "reef"], &options[..]].concat());
@@ -85,4 +127,18 @@ fn bad_options_exit_with_2_and_a_hint() {
         assert!(!dive.path("reef").exists());
     }
     assert_eq!(dive.fails(&["synth"]).0, 2);
+    // A file of settings without a folder, and files that are wrong.
+    let (code, message) = dive.fails(&["synth", "scene.toml"]);
+    assert!(code == 2 && message.contains("no folder to write into"), "{code}: {message}");
+    for (text, told) in [
+        ("[water]\nsalt = 3\n", "line 2"),
+        ("[motion]\nframes = 0\n", "motion.frames = 0 must be from 1"),
+        ("[[rig.cameras]]\nfocal_mm = 1e9\n", "focal_mm of rig.cameras[0]"),
+    ] {
+        dive.write("bad.toml", text);
+        let (code, message) = dive.fails(&["synth", "bad.toml", "reef"]);
+        assert!(code == 2 && message.contains(told), "{code}: {message}");
+        assert!(!dive.path("reef").exists());
+    }
+    assert_eq!(dive.fails(&["synth", "no.toml", "reef"]).0, 1);
 }

@@ -81,37 +81,88 @@ pub struct InitArgs {
 /// Arguments of `sfm synth`.
 #[derive(Debug, Args)]
 pub struct SynthArgs {
-    /// Folder to write; new or empty.
-    pub folder: PathBuf,
+    /// Optionally a file of settings (docs/synth.md lists them), then the folder to write: new or empty.
+    #[arg(value_names = ["SCENE.toml", "FOLDER"], num_args = 1..=2, required = true)]
+    pub paths: Vec<PathBuf>,
+    /// The dive that settings start from.
+    #[arg(long, value_enum, default_value_t = Preset::Demo)]
+    pub preset: Preset,
+    /// What stands on the bottom, and a path that suits it.
+    #[arg(long, value_enum)]
+    pub scene: Option<Scene>,
     /// Instants at which all cameras are exposed.
-    #[arg(long, value_name = "N", default_value_t = 14, value_parser = clap::value_parser!(u16).range(2..=9999))]
-    pub frames: u16,
-    /// Cameras of the rig: side by side, the third above them.
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(2..=3))]
-    pub cameras: u8,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=9999))]
+    pub frames: Option<u16>,
+    /// Cameras of the rig: two look forward, the third backward and down.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
+    pub cameras: Option<u8>,
     /// Width and height of an image, pixels.
-    #[arg(long, value_name = "WxH", default_value = "960x600", value_parser = image_size)]
-    pub size: (u32, u32),
+    #[arg(long, value_name = "WxH", value_parser = image_size)]
+    pub size: Option<(u32, u32)>,
     /// What lies between scene and camera.
-    #[arg(long, value_enum, default_value_t = Water::Clear)]
-    pub water: Water,
+    #[arg(long, value_enum)]
+    pub water: Option<Water>,
+    /// What the cameras look through.
+    #[arg(long, value_enum)]
+    pub port: Option<Port>,
     /// Standard deviation of the sensor noise, grey values of 255.
-    #[arg(long, value_name = "GREY", default_value_t = 1.5, value_parser = noise)]
-    pub noise: f64,
-    /// Seed of path, texture, noise and picks: another one is another dive.
-    #[arg(long, value_name = "S", default_value_t = 7)]
-    pub seed: u64,
+    #[arg(long, value_name = "GREY", value_parser = noise)]
+    pub noise: Option<f32>,
+    /// Seed of path, shapes, texture, noise and picks: another one is another dive.
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..=9_007_199_254_740_992))]
+    pub seed: Option<u64>,
     /// Number of threads; the bytes are the same with any [default: one a processor].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
 }
 
+/// A dive that is ready made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    /// Half a round of a reef, two cameras, small frames: in a minute.
+    Demo,
+    /// Round a reef and up, three cameras, frames of 1920 x 1200.
+    Survey,
+    /// Grids of tags in a tank, from near and all sides.
+    Calibration,
+    /// Grids of tags in a tank, from above.
+    Tank,
+}
+
+/// What stands on the bottom.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Scene {
+    /// A cube of concrete slabs and beams.
+    Reef,
+    /// A wreck.
+    Hull,
+    /// A pipeline.
+    Pipeline,
+    /// Packed hemispheres of known radius.
+    Hemispheres,
+    /// Grids of tags in a tank.
+    Tank,
+}
+
 /// What lies between scene and camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Water {
-    /// Clear coastal water.
+    /// Clear oceanic water (Jerlov IB).
     Clear,
+    /// Coastal water (Jerlov 1).
+    Coastal,
+    /// Turbid coastal water (Jerlov 5).
+    Turbid,
     /// Air.
+    None,
+}
+
+/// What the cameras look through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Port {
+    /// A flat acrylic window: rays are refracted.
+    Flat,
+    /// Nothing: pinhole cameras with lens distortion.
     None,
 }
 
@@ -163,7 +214,7 @@ fn image_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-fn noise(text: &str) -> Result<f64, String> {
+fn noise(text: &str) -> Result<f32, String> {
     let value = text.parse().ok().filter(|v| (0.0..=100.0).contains(v));
     value.ok_or_else(|| "give a number from 0 to 100, for example 1.5".to_owned())
 }

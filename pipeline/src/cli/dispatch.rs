@@ -4,6 +4,7 @@ use super::args::{Cli, Command};
 use super::{eval, help, init, run, status, synth};
 use crate::config::ConfigError;
 use crate::error::{Misfit, NoResult};
+use crate::synth::SynthError;
 use anyhow::Context;
 use clap::Parser;
 use std::io::{ErrorKind, Write};
@@ -39,7 +40,8 @@ pub fn main() -> ExitCode {
 }
 
 fn exit_code(error: &anyhow::Error) -> ExitCode {
-    if error.chain().any(|e| e.is::<ConfigError>() || e.is::<Misfit>() || e.is::<super::help::NoTopic>()) {
+    let bad_synth = |e: &(dyn std::error::Error + 'static)| e.downcast_ref::<SynthError>().is_some_and(SynthError::is_usage);
+    if error.chain().any(|e| e.is::<ConfigError>() || e.is::<Misfit>() || e.is::<super::help::NoTopic>() || bad_synth(e)) {
         ExitCode::from(USAGE)
     } else if error.chain().any(|e| e.is::<NoResult>()) {
         ExitCode::from(NO_RESULT)

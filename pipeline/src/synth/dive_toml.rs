@@ -1,11 +1,14 @@
 //! The dive.toml of a synthetic dive.
 
+use super::truth::brown;
 use nalgebra::Vector3;
 use std::fmt::Write;
-use synthetic::dive::{Dive, DiveOptions, DiveScene, Pick};
+use synthetic::dive::{DiveScene, Pick};
 
 /// Standard deviation of the given baselines, metres: as of a rig measured in a pool.
 const BASELINE_SIGMA_M: f64 = 0.0005;
+/// Standard deviation of a camera's rotation in the rig, degrees.
+const POSE_SIGMA_DEG: f64 = 0.02;
 /// Standard deviation of the bars, metres.
 const BAR_SIGMA_M: f64 = 0.0005;
 /// Picks of each end of a bar.
@@ -16,54 +19,58 @@ const HEAD: &str = "\
 # Do it with `sfm run dive.toml`, or with the path of this file. docs/dive-toml.md explains every key.
 ";
 
-pub(super) fn dive_toml(dive: &DiveScene, options: &DiveOptions) -> String {
+pub(super) fn dive_toml(dive: &DiveScene) -> String {
     let mut text = String::from(HEAD);
     let _ = write!(
         text,
-        "\n[dive]\nname = \"Synthetic reef, seed {}\"\noutput = \"out\"\nframes_from = \"stem\"  # files of the same name belong together\n",
-        options.seed
+        "\n[dive]\nname = \"Synthetic dive, seed {}\"\noutput = \"out\"\nframes_from = \"stem\"  # files of the same name belong together\n",
+        dive.options.seed
     );
     for (c, camera) in dive.cameras.iter().enumerate() {
         let name = format!("C{}", c + 1);
         let _ = write!(text, "\n[[camera]]\nname = \"{name}\"\nimages = \"frames/{name}\"\n");
-        let _ = writeln!(text, "mask = \"truth/masks/{name}/{{stem}}.png\"  # the true masks; [mask] says whether they are used");
-        if let [f, cx, cy, k] = camera.params() {
-            text.push_str("# The true interior orientation, refined all the same; without it a guess is the start.\n");
-            let _ = writeln!(text, "interior = {{ model = \"simple-radial\", f = {f:.3}, cx = {cx:.3}, cy = {cy:.3}, k = {k:.4} }}");
-        }
+        let _ = writeln!(text, "mask = \"truth/masks/{name}/{{stem}}.png\"  # the true masks; [mask] says that they are used");
+        text.push_str("# As a calibration in the water finds it; refined all the same. Without it a guess is the start.\n");
+        let _ = writeln!(text, "interior = {}", brown(&camera.calibrated.camera));
     }
     baselines(&mut text, dive);
-    for (i, bar) in dive.scale_bars.iter().enumerate() {
+    if looks_apart(dive) {
+        mounting(&mut text, dive);
+    }
+    let count = dive.world.bars.len();
+    for (i, bar) in dive.world.bars.iter().enumerate() {
         let ends = bar.ends.map(|end| picks(dive, &end));
         if ends.iter().any(|picks| picks.len() < 2) {
             continue;
         }
         // The last one is held out.
-        let check = i + 1 == dive.scale_bars.len();
+        let check = i + 1 == count;
         let word = if check { "held out: only compared with what is found" } else { "takes part in the adjustment" };
         let _ = write!(text, "\n# A known length in the scene, {word}. Its ends were picked by hand, to 0.3 px.\n[[scale_bar]]\n");
         let _ = write!(text, "name = \"{}\"\nlength_m = {:.6}\nsigma_m = {BAR_SIGMA_M}\ncheck = {check}\n", bar.name, bar.length_m());
         text.push_str("endpoints = [\n");
         for end in ends {
             text.push_str("    [\n");
-            for Pick { camera, exposure, pixel: [x, y] } in end {
-                let name = Dive::name(camera, exposure, "jpg");
+            for Pick { camera, exposure, pixel: [x, y], .. } in end {
+                let name = DiveScene::name(camera, exposure, dive.options.frame_extension());
                 let _ = writeln!(text, "        {{ image = \"{name}\", x = {x:.1}, y = {y:.1} }},");
             }
             text.push_str("    ],\n");
         }
         text.push_str("]\n");
     }
-    text.push_str("\n[mask]\nstrategy = \"none\"  # \"files\" takes the masks named above, \"ip\" makes some by image processing\n");
+    text.push_str("\n[mask]\nstrategy = \"files\"  # the true masks named above; \"none\" leaves the water in, \"ip\" makes masks by image processing\n");
+    text.push_str("\n[matching]\npairs = \"sequential\"  # neighbours in time, and places that look alike\n");
     text.push_str("\n[densify]\nquality = \"low\"  # quick; \"medium\" takes the frames as they are up to 960 pixels\n");
     text.push_str(
-        "\n[evaluate]\nreference = \"truth/mesh.ply\"\npositions = \"truth/positions.txt\"  # moves the model to the frame of the mesh\n",
+        "\n[evaluate]\nreference = \"truth/seen.ply\"  # the part of truth/mesh.ply that two frames or more show\n\
+         positions = \"truth/positions.txt\"  # moves the model to the frame of the mesh\n",
     );
     text
 }
 
 fn baselines(text: &mut String, dive: &DiveScene) {
-    let centres: Vec<Vector3<f64>> = dive.cam_from_rig.iter().map(|pose| pose.centre()).collect();
+    let centres: Vec<Vector3<f64>> = dive.cameras.iter().map(|camera| camera.cam_from_rig.centre()).collect();
     if centres.len() > 1 {
         text.push_str("\n# Distances between the cameras make the model metric.\n");
     }
@@ -82,9 +89,38 @@ fn baselines(text: &mut String, dive: &DiveScene) {
     text.push('\n');
 }
 
-/// A few picks, spread evenly over the frames that show the point.
+/// Whether a camera looks where the first one does not: it is oriented by its place in the rig.
+fn looks_apart(dive: &DiveScene) -> bool {
+    dive.cameras.iter().any(|camera| (camera.cam_from_rig.rotation.inverse() * Vector3::z()).z < 0.5)
+}
+
+/// The poses in the rig, as a calibration in a frame of targets gives them.
+fn mounting(text: &mut String, dive: &DiveScene) {
+    text.push_str("\n# A camera looks where the others do not: its place in the rig was calibrated in a frame of targets.\n");
+    for (c, camera) in dive.cameras.iter().enumerate().skip(1) {
+        let (turn, t) = (camera.cam_from_rig.rotation.scaled_axis().map(f64::to_degrees), camera.cam_from_rig.translation);
+        let _ = write!(
+            text,
+            "[rig.pose.C{}]\naxis_angle_deg = [{:.6}, {:.6}, {:.6}]\ntranslation_m = [{:.6}, {:.6}, {:.6}]\nsigma_deg = {POSE_SIGMA_DEG}\nsigma_m = {BASELINE_SIGMA_M}\n\n",
+            c + 1,
+            turn.x,
+            turn.y,
+            turn.z,
+            t.x,
+            t.y,
+            t.z
+        );
+    }
+    text.truncate(text.trim_end().len());
+    text.push('\n');
+}
+
+/// A few picks of the nearest frames, spread evenly over them: people pick where they see well.
 fn picks(dive: &DiveScene, point: &Vector3<f64>) -> Vec<Pick> {
-    let all = dive.picks(point);
+    let mut all = dive.picks(point);
+    all.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+    all.truncate(3 * PICKS);
+    all.sort_by_key(|pick| (pick.camera, pick.exposure));
     let count = all.len().min(PICKS);
     (0..count).map(|i| all[i * all.len() / count]).collect()
 }

@@ -1,37 +1,12 @@
 //! The folder that a dive is written into: an empty one, or one that was not finished.
 
+use super::error::SynthError;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Lies in the folder until all is written.
 const UNFINISHED: &str = ".unfinished";
-
-/// Why a dive cannot be written.
-#[derive(Debug, Error)]
-pub enum SynthError {
-    /// Something lies in the folder.
-    #[error("{} is not empty\n  hint: name a new folder; nothing has been written", folder.display())]
-    NotEmpty {
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// A dive of other options was begun in the folder.
-    #[error("{} holds a part of another dive\n  hint: remove it, or name a new folder; nothing has been written", folder.display())]
-    OtherDive {
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// A file or folder cannot be read or written.
-    #[error("{}: {cause}", path.display())]
-    File {
-        /// The file or folder.
-        path: PathBuf,
-        /// Why.
-        cause: io::Error,
-    },
-}
 
 /// A folder that is being written.
 pub(super) struct Folder {

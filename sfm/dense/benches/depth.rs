@@ -11,8 +11,8 @@ const EXPOSURES: usize = 8;
 const RANGE: (f64, f64) = (2.0, 9.0);
 
 fn views() -> Vec<View> {
-    let dive = render_dive(&DiveOptions { exposures: EXPOSURES, ..Default::default() });
-    let truth = dive.truth("png");
+    let dive = render_dive(&DiveOptions::small(EXPOSURES, 640, 400)).expect("the options are possible");
+    let truth = dive.scene.truth("png");
     let view = |(index, image): (usize, &synthetic::dive::DiveImage)| View {
         image: ImageId::new(index),
         camera: truth.cameras[image.camera],

@@ -31,14 +31,14 @@ impl Dive {
 
     /// A rendered dive of two cameras: `frames/C1/0000.png` and so on, and `reference.ply`, its true surface.
     pub fn rendered(options: &synthetic::dive::DiveOptions) -> (Self, synthetic::dive::Dive) {
-        let (folder, dive) = (Self::empty(), synthetic::dive::render_dive(options));
+        let (folder, dive) = (Self::empty(), synthetic::dive::render_dive(options).unwrap());
         for image in &dive.images {
-            let path = folder.path("frames").join(synthetic::dive::Dive::name(image.camera, image.exposure, "png"));
+            let path = folder.path("frames").join(synthetic::dive::DiveScene::name(image.camera, image.exposure, "png"));
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, imaging::encode_png_rgb(&image.rgb).unwrap()).unwrap();
         }
         let mut mesh = Vec::new();
-        scene::format::write_ply_mesh(&dive.mesh, &mut mesh).unwrap();
+        scene::format::write_ply_mesh(&dive.scene.world.mesh(), &mut mesh).unwrap();
         std::fs::write(folder.path("reference.ply"), mesh).unwrap();
         (folder, dive)
     }

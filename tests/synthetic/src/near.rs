@@ -1,6 +1,6 @@
 //! A reconstruction against the truth.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use scene::{ImageId, Reconstruction, Similarity3};
 use std::collections::BTreeMap;
 
@@ -22,6 +22,17 @@ pub struct Tolerances {
     pub centre: f64,
     /// Angle between rotations, radians.
     pub rotation_rad: f64,
+    /// Distance of where a direction is imaged, over the whole frame of each camera, pixels.
+    pub interior_px: f64,
+    /// Distance of points, in the unit of the truth; only for reconstructions of the same points in the same order.
+    pub points: f64,
+}
+
+impl Default for Tolerances {
+    /// No image may be missing; anything else passes.
+    fn default() -> Self {
+        Self { missing_images: 0, centre: f64::INFINITY, rotation_rad: f64::INFINITY, interior_px: f64::INFINITY, points: f64::INFINITY }
+    }
 }
 
 /// How far a reconstruction is from the truth.
@@ -35,6 +46,10 @@ pub struct Deviation {
     pub rms_centre: f64,
     /// Largest angle between rotations, radians, and the image.
     pub max_rotation_rad: (f64, String),
+    /// Largest distance of where a direction is imaged, pixels, and the camera's number; cameras are compared in their order.
+    pub max_interior_px: (f64, usize),
+    /// Root mean square distance of points after the alignment; `None` where the numbers of points differ.
+    pub rms_points: Option<f64>,
     /// Units of the truth in one unit of the reconstruction, by the best similarity.
     pub scale: f64,
 }
@@ -56,8 +71,15 @@ pub fn deviation(found: &Reconstruction, truth: &Reconstruction, alignment: Alig
     let to: Vec<Vector3<f64>> = common.iter().map(|(_, _, truth)| truth.centre()).collect();
     let free = Similarity3::align(&from, &to, true)?;
     let used = Similarity3::align(&from, &to, alignment == Alignment::Sim3)?;
-    let mut out =
-        Deviation { missing, max_centre: (0.0, String::new()), rms_centre: 0.0, max_rotation_rad: (0.0, String::new()), scale: free.scale };
+    let mut out = Deviation {
+        missing,
+        max_centre: (0.0, String::new()),
+        rms_centre: 0.0,
+        max_rotation_rad: (0.0, String::new()),
+        max_interior_px: interior(found, truth),
+        rms_points: points(found, truth, &used),
+        scale: free.scale,
+    };
     for (name, found, truth) in &common {
         let aligned = found.in_new_world(&used);
         let distance = (aligned.centre() - truth.centre()).norm();
@@ -72,6 +94,33 @@ pub fn deviation(found: &Reconstruction, truth: &Reconstruction, alignment: Alig
     }
     out.rms_centre = out.rms_centre.sqrt();
     Some(out)
+}
+
+/// Places along each side of a frame at which cameras are compared.
+const GRID: usize = 12;
+
+fn interior(found: &Reconstruction, truth: &Reconstruction) -> (f64, usize) {
+    let mut worst = (0.0, 0);
+    for (c, (found, truth)) in found.cameras.iter().zip(&truth.cameras).enumerate() {
+        for i in 0..GRID * GRID {
+            let place = |k: usize, size: u32| (k as f64 + 0.5) / GRID as f64 * f64::from(size);
+            let pixel = Vector2::new(place(i % GRID, truth.width()), place(i / GRID, truth.height()));
+            let seen = truth.ray(&pixel).and_then(|ray| found.project(&ray));
+            let miss = seen.map_or(f64::INFINITY, |p| (p - pixel).norm());
+            if miss > worst.0 {
+                worst = (miss, c);
+            }
+        }
+    }
+    worst
+}
+
+fn points(found: &Reconstruction, truth: &Reconstruction, truth_from_found: &Similarity3) -> Option<f64> {
+    if found.points.len() != truth.points.len() || truth.points.is_empty() {
+        return None;
+    }
+    let squares = found.points.iter().zip(&truth.points).map(|(f, t)| (truth_from_found.apply(&f.xyz) - t.xyz).norm_squared());
+    Some((squares.sum::<f64>() / truth.points.len() as f64).sqrt())
 }
 
 /// Panics with the figures when a reconstruction is further from the truth than the tolerances.
@@ -98,6 +147,17 @@ pub fn assert_near(found: &Reconstruction, truth: &Reconstruction, tolerances: &
         d.max_rotation_rad.0,
         tolerances.rotation_rad
     );
+    assert!(
+        d.max_interior_px.0 <= tolerances.interior_px,
+        "camera {} images directions up to {} px away (at most {})",
+        d.max_interior_px.1,
+        d.max_interior_px.0,
+        tolerances.interior_px
+    );
+    if tolerances.points.is_finite() {
+        let points = d.rms_points.expect("points are compared only with as many of them");
+        assert!(points <= tolerances.points, "points are off by {points} RMS (at most {})", tolerances.points);
+    }
 }
 
 #[cfg(test)]
@@ -107,13 +167,13 @@ mod tests {
     use nalgebra::UnitQuaternion;
     use scene::Rigid3;
 
-    const TIGHT: Tolerances = Tolerances { missing_images: 0, centre: 1e-9, rotation_rad: 1e-7 };
+    const TIGHT: Tolerances = Tolerances { missing_images: 0, centre: 1e-9, rotation_rad: 1e-7, interior_px: 1e-9, points: 1e-9 };
 
     fn truth() -> Reconstruction {
         survey(&SurveyOptions { exposures: 6, cameras: 2, points: 10, ..SurveyOptions::default() }).truth
     }
 
-    /// The same scene in another world: the frames and the rig move, the points do not matter.
+    /// The same scene in another world: frames, rig and points move.
     fn moved(truth: &Reconstruction, scale: f64) -> Reconstruction {
         let rotation = UnitQuaternion::from_euler_angles(0.4, -1.0, 2.5);
         let world = Similarity3 { scale, rotation, translation: Vector3::new(3.0, -5.0, 8.0) };
@@ -124,6 +184,7 @@ mod tests {
         for sensor in &mut out.rigs[0].sensors {
             sensor.cam_from_rig.translation *= scale;
         }
+        out.points.iter_mut().for_each(|p| p.xyz = world.apply(&p.xyz));
         out
     }
 
@@ -135,6 +196,16 @@ mod tests {
         assert_near(&scaled, &truth, &TIGHT, Alignment::Sim3);
         let rigid = deviation(&scaled, &truth, Alignment::Se3).expect("enough images");
         assert!((rigid.scale - 4.0).abs() < 1e-9 && rigid.max_centre.0 > 0.5, "{rigid:?}");
+    }
+
+    #[test]
+    fn cameras_are_compared_by_what_they_image() {
+        let truth = truth();
+        let mut other = truth.clone();
+        // 1 % of the principal distance: 5.6 px at the corner of 960 x 600, half a cell from it.
+        other.cameras[1].params_mut()[0] *= 1.01;
+        let d = deviation(&other, &truth, Alignment::Se3).expect("enough images");
+        assert!((4.5..5.7).contains(&d.max_interior_px.0) && d.max_interior_px.1 == 1, "{d:?}");
     }
 
     #[test]

@@ -31,7 +31,7 @@ fn without_noise_the_truth_comes_out() {
     let (made, input) = made(&SurveyOptions { noise_px: 0.0, ..noisy(1) });
     let out = oriented(&input);
     // Keypoints are f32: an error of at most 3e-5 px, a 16,000th of the noise elsewhere, and so of its effect (1 cm).
-    let tolerances = Tolerances { missing_images: 0, centre: 1e-5, rotation_rad: 1e-5 };
+    let tolerances = Tolerances { missing_images: 0, centre: 1e-5, rotation_rad: 1e-5, ..Tolerances::default() };
     assert_near(&out.models[0], &made.truth, &tolerances, Alignment::Sim3);
 }
 
