@@ -212,6 +212,8 @@ impl DiveOptions {
         within("water.snow_per_m3", self.water.snow_per_m3, 0.0, 1e4)?;
         within("water.caustics", f64::from(self.water.caustics), 0.0, 1.0)?;
         within("lamps.power", f64::from(self.lamps.power), 0.0, 1e4)?;
+        within("lamps.half_spacing_m", self.lamps.half_spacing_m, -10.0, 10.0)?;
+        within("lamps.above_m", self.lamps.above_m, -10.0, 10.0)?;
         within("lamps.half_angle_deg", f64::from(self.lamps.half_angle_deg), 1.0, 85.0)?;
         within("response.gain", f64::from(self.response.gain.unwrap_or(1.0)), 1e-6, 1e9)?;
         within("response.white_balance", f64::from(self.response.white_balance), 0.0, 1.0)?;

@@ -118,6 +118,11 @@ impl SensorOptions {
                 return Err(format!("sensors.{key} = {value} must be from 0 to {most}"));
             }
         }
+        for (key, arm) in [("transponder_m", self.transponder_m), ("pressure_sensor_m", self.pressure_sensor_m)] {
+            if !arm.iter().all(|v| v.abs() <= 100.0) {
+                return Err(format!("sensors.{key} = {arm:?} must be within 100 metres"));
+            }
+        }
         Ok(())
     }
 }

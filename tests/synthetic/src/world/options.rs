@@ -77,7 +77,13 @@ impl WorldOptions {
         within("detail_m", self.detail_m, 0.008, 0.2)?;
         within("growth_m", self.growth_m, 0.0, 0.15)?;
         within("bottom_half_m", self.bottom_half_m, 1.0, 50.0)?;
-        within("stones", f64::from(self.stones), 0.0, 5000.0)?;
+        if self.bottom_half_m > 1200.0 * self.detail_m {
+            return Err(format!(
+                "world.bottom_half_m = {} is too large for world.detail_m = {}: at most 1200 times as large",
+                self.bottom_half_m, self.detail_m
+            ));
+        }
+        within("stones", f64::from(self.stones), 0.0, 2000.0)?;
         within("fish", f64::from(self.fish), 0.0, 500.0)?;
         within("hemisphere_radius_m", self.hemisphere_radius_m, 0.01, 0.5)
     }
