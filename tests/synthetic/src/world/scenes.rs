@@ -117,7 +117,7 @@ fn pipeline_scene(options: &WorldOptions) -> World {
 fn hemispheres(options: &WorldOptions) -> World {
     let radius = options.hemisphere_radius_m;
     let half = [0.6, 0.45];
-    let ball = super::bottom::ball(5);
+    let ball = super::bottom::ball(4);
     let mut mesh = Mesh::default();
     let rows = (2.0 * half[1] / (radius * 3f64.sqrt())) as i32;
     for row in 0..rows {
