@@ -186,6 +186,9 @@ impl DiveOptions {
         within("rig.height", f64::from(self.rig.height), 16.0, 8192.0)?;
         within("rig.sensor_width_mm", self.rig.sensor_width_mm, 0.5, 100.0)?;
         within("number of rig.cameras", self.rig.cameras.len() as f64, 1.0, 16.0)?;
+        if self.rig.cameras[0].centre_m != [0.0; 3] || self.rig.cameras[0].turn_deg != [0.0; 3] {
+            return Err("centre_m and turn_deg of rig.cameras[0] must be 0: the first camera is the frame of the rig".to_owned());
+        }
         for (i, camera) in self.rig.cameras.iter().enumerate() {
             let key = |name: &str| format!("{name} of rig.cameras[{i}]");
             within(&key("focal_mm"), camera.focal_mm, 0.1 * self.rig.sensor_width_mm, 50.0 * self.rig.sensor_width_mm)?;

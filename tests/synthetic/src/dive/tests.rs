@@ -166,6 +166,9 @@ fn impossible_options_are_told_by_their_key() {
     };
     told(|o| o.rig.width = 0, "rig.width");
     told(|o| o.rig.cameras.clear(), "rig.cameras");
+    told(|o| o.rig.cameras[0].turn_deg[1] = 5.0, "turn_deg of rig.cameras[0]");
+    told(|o| (o.world.bottom_half_m, o.world.detail_m) = (50.0, 0.01), "world.bottom_half_m");
+    told(|o| o.sensors.transponder_m[2] = f64::NAN, "sensors.transponder_m");
     told(|o| o.rig.cameras[1].focal_mm = f64::NAN, "focal_mm of rig.cameras[1]");
     told(|o| o.rig.cameras[0].radial = [-0.3, -0.3], "distortion");
     told(|o| o.world.detail_m = 0.0, "world.detail_m");
