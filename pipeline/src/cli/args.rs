@@ -30,6 +30,7 @@ pub enum Command {
     /// Write a commented dive.toml for a folder of images or videos to stdout.
     Init(InitArgs),
     /// Render a dive whose truth is known: frames, dive.toml, truth.
+    #[command(override_usage = "sfm synth [OPTIONS] [SCENE.toml] <FOLDER>")]
     Synth(SynthArgs),
     /// Measure a cloud against a reference in the same frame.
     Eval(EvalArgs),
@@ -82,7 +83,7 @@ pub struct InitArgs {
 #[derive(Debug, Args)]
 pub struct SynthArgs {
     /// Optionally a file of settings (docs/synth.md lists them), then the folder to write: new or empty.
-    #[arg(value_names = ["SCENE.toml", "FOLDER"], num_args = 1..=2, required = true)]
+    #[arg(value_name = "FOLDER", num_args = 1..=2, required = true)]
     pub paths: Vec<PathBuf>,
     /// The dive that settings start from.
     #[arg(long, value_enum, default_value_t = Preset::Demo)]
