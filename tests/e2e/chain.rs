@@ -90,8 +90,7 @@ fn harris_corners_orient_a_dive() {
     // Another method is other features and matches, not what lies there.
     dive.write("dive.toml", &format!("{cameras}{rig}{}", rest.replace("harris-ncc", "sift")));
     let status = dive.ok(&["status", "--json"]);
-    let stages: Value = serde_json::from_str(&status).unwrap();
-    assert!(status.contains("features") && !stages.is_null(), "{status}");
+    assert!(status.contains("stale"), "{status}");
     let sift: Value = serde_json::from_str(&dive.ok(&["run", "--until", "matching", "--json"])).unwrap();
     assert_ne!(sift["features"]["keypoints"], printed["features"]["keypoints"]);
 }

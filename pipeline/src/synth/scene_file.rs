@@ -16,9 +16,19 @@ pub fn read_scene(path: &Path, preset: &DiveOptions) -> Result<DiveOptions, Synt
     // Read alone first: its errors know their lines.
     toml::from_str::<DiveOptions>(&text).map_err(|e| wrong(e.to_string()))?;
     let changes: Table = toml::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+    let named = |table: &str| changes.get(table).and_then(|t| t.get("seed")).and_then(Value::as_integer);
+    let (seed, path, world) = (changes.contains_key("seed"), named("motion"), named("world"));
     let mut all = Table::try_from(preset).map_err(|e| wrong(e.to_string()))?;
     overlay(&mut all, changes);
-    all.try_into().map_err(|e: toml::de::Error| wrong(e.to_string()))
+    let mut options: DiveOptions = all.try_into().map_err(|e: toml::de::Error| wrong(e.to_string()))?;
+    if seed {
+        // One seed stands for all that have none of their own.
+        let own = (options.motion.seed, options.world.seed);
+        options.reseed(options.seed);
+        options.motion.seed = path.map_or(options.motion.seed, |_| own.0);
+        options.world.seed = world.map_or(options.world.seed, |_| own.1);
+    }
+    Ok(options)
 }
 
 /// Tables are merged, everything else is replaced.
@@ -50,6 +60,8 @@ mod tests {
         let preset = DiveOptions::preset(Preset::Survey);
         assert_eq!(read("").unwrap(), preset);
         let changed = read("seed = 3\n[water]\njerlov = \"3\"\n[rig.port]\nkind = \"none\"\n[[rig.cameras]]\nfocal_mm = 8.0\n").unwrap();
+        assert_eq!((changed.motion.seed, changed.world.seed), (3, 3), "one seed for all");
+        assert_eq!(read("seed = 3\n[motion]\nseed = 5\n").unwrap().motion.seed, 5);
         assert_eq!((changed.seed, changed.rig.cameras.len(), changed.rig.cameras[0].focal_mm), (3, 1, 8.0));
         assert_eq!((changed.water.depth_m, changed.rig.width), (preset.water.depth_m, preset.rig.width));
         // What is written down reads back.

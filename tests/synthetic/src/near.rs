@@ -100,6 +100,9 @@ pub fn deviation(found: &Reconstruction, truth: &Reconstruction, alignment: Alig
 const GRID: usize = 12;
 
 fn interior(found: &Reconstruction, truth: &Reconstruction) -> (f64, usize) {
+    if found.cameras.len() != truth.cameras.len() {
+        return (f64::INFINITY, found.cameras.len().min(truth.cameras.len()));
+    }
     let mut worst = (0.0, 0);
     for (c, (found, truth)) in found.cameras.iter().zip(&truth.cameras).enumerate() {
         for i in 0..GRID * GRID {
@@ -107,8 +110,8 @@ fn interior(found: &Reconstruction, truth: &Reconstruction) -> (f64, usize) {
             let pixel = Vector2::new(place(i % GRID, truth.width()), place(i / GRID, truth.height()));
             let seen = truth.ray(&pixel).and_then(|ray| found.project(&ray));
             let miss = seen.map_or(f64::INFINITY, |p| (p - pixel).norm());
-            if miss > worst.0 {
-                worst = (miss, c);
+            if miss.is_nan() || miss > worst.0 {
+                worst = (if miss.is_nan() { f64::INFINITY } else { miss }, c);
             }
         }
     }

@@ -63,7 +63,7 @@ fn diagonal(features: &Features) -> f64 {
 }
 
 fn near(a: &Features, b: &Features, motion: &Motion, options: &NccOptions) -> Vec<(KeypointIndex, KeypointIndex)> {
-    let radius = (REACH * motion.spread_px).max(options.min_radius_px);
+    let radius = (REACH * motion.spread_px).max(options.min_radius_px).max(1.0);
     let grid = Grid::new(b, radius);
     let limit = distance_at(options.min_correlation);
     let mut best_of_a = vec![(u32::MAX, u32::MAX); a.len()];

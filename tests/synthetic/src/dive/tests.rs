@@ -173,6 +173,7 @@ fn impossible_options_are_told_by_their_key() {
     told(|o| o.rig.cameras[0].radial = [-0.3, -0.3], "distortion");
     told(|o| o.world.detail_m = 0.0, "world.detail_m");
     told(|o| o.motion.frames = 0, "motion.frames");
+    told(|o| (o.motion.kind, o.motion.length_m, o.motion.spacing_m) = (crate::motion::MotionKind::Lanes, 0.0, 0.0), "motion.length_m");
     told(|o| o.water.snow_per_m3 = -1.0, "water.snow_per_m3");
     told(|o| o.sensors.imu_hz = f64::INFINITY, "sensors.imu_hz");
 }

@@ -88,6 +88,9 @@ impl MotionOptions {
         within("length_m", self.length_m, 0.0, 1000.0)?;
         within("spacing_m", self.spacing_m, 0.0, 100.0)?;
         within("lanes", f64::from(self.lanes), 1.0, 1000.0)?;
+        if self.kind == MotionKind::Lanes && self.length_m + self.spacing_m <= 0.0 {
+            return Err("motion.length_m = 0 and motion.spacing_m = 0 leave lanes without a way".to_owned());
+        }
         within("current_m", self.current_m, 0.0, 10.0)?;
         within("current_deg", self.current_deg, 0.0, 90.0)?;
         within("push_m", self.push_m, 0.0, 1.0)?;
