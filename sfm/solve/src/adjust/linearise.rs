@@ -31,6 +31,8 @@ pub(super) const MAX_ROW: usize = 12 + MAX_CAMERA_PARAMS;
 pub(super) struct PointNormal {
     pub h: [f64; 6],
     pub g: [f64; 3],
+    /// Cost of its observations.
+    pub cost: f64,
 }
 
 /// Normal equations of the image observations at a state.
@@ -195,7 +197,7 @@ fn linearise_piece(layout: &Layout, state: &State, loss: &Loss, piece: usize, no
                 debug_assert!(false, "a state that is linearised was evaluated before");
                 j = ObservationJacobian::default();
             }
-            cost += j.cost;
+            point.cost += j.cost;
             let view = &layout.views[observation.view as usize];
             let v = observation.view as usize;
             kernels::add_view(view.row_len(), &j, &mut normal.views[normal.view_start[v]..normal.view_start[v + 1]]);
@@ -211,13 +213,14 @@ fn linearise_piece(layout: &Layout, state: &State, loss: &Loss, piece: usize, no
                 }
             }
         }
+        cost += point.cost;
         normal.points[s - first] = point;
     }
     cost
 }
 
 impl PointNormal {
-    fn add(&mut self, j: &ObservationJacobian) {
+    pub fn add(&mut self, j: &ObservationJacobian) {
         let [e0, e1] = j.point;
         let mut i = 0;
         for a in 0..3 {

@@ -1,5 +1,6 @@
 //! The Levenberg-Marquardt loop.
 
+use super::conjugate::System;
 use super::error::{AdjustError, validate};
 use super::layout::{Layout, Owner};
 use super::lengths::{KeptNormal, length_residuals, prior_residuals};
@@ -16,7 +17,11 @@ use super::summary::{AdjustSummary, ParameterCounts, ReprojectionErrors, Termina
 const PARALLEL_OBSERVATIONS: usize = 4000;
 /// A step is taken when the cost falls by at least this share of what the linear model promises.
 const MIN_RELATIVE_DECREASE: f64 = 1e-3;
-const MAX_RADIUS: f64 = 1e16;
+/// Along directions that nothing determines (position, orientation and scale of a world without lengths) only the damping holds the step: with a
+/// larger radius the rounding errors of the gradient would move the world.
+const MAX_RADIUS: f64 = 1e9;
+/// Changes of the cost below this share of it drown in rounding errors: such a step is taken unseen.
+const COST_NOISE: f64 = 1e-12;
 const MIN_RADIUS: f64 = 1e-32;
 
 /// Adjusts the free blocks of a problem to minimise its cost, the sum over all residuals of rho(r^2) / 2.
@@ -113,7 +118,8 @@ fn minimise(problem: &Problem, options: &AdjustOptions, layout: &Layout, state: 
         }
         fresh = false;
         outcome.iterations += 1;
-        if !solver.solve(&mut reduced) || !candidate.set_moved(state, &reduced.rhs, layout) {
+        let system = System { layout, linear: &linear, kept: &kept, parallel };
+        if !solver.solve(&system, &mut reduced) || !candidate.set_moved(state, &reduced.rhs, layout) {
             region.reject();
             continue;
         }
@@ -121,20 +127,27 @@ fn minimise(problem: &Problem, options: &AdjustOptions, layout: &Layout, state: 
         let new_cost = sums.cost + kept.cost(problem, layout, &candidate, loss);
         let decrease = outcome.final_cost - new_cost;
         let ratio = decrease / sums.model_decrease;
-        let accepted = new_cost.is_finite() && sums.model_decrease > 0.0 && ratio > MIN_RELATIVE_DECREASE;
-        let norm = (sums.points_norm_squared + state.kept_norm_squared(layout)).sqrt();
-        let small_step = sums.step_norm_squared.sqrt() <= options.parameter_tolerance * (norm + options.parameter_tolerance);
+        let noise = COST_NOISE * outcome.final_cost;
+        let unseen = sums.model_decrease <= noise && decrease.abs() <= noise;
+        let accepted = new_cost.is_finite() && sums.model_decrease > 0.0 && (ratio > MIN_RELATIVE_DECREASE || unseen);
+        let world = sums.world_size(layout.slot_count());
+        let largest = sums.largest_step(world).max(state.largest_step(&reduced.rhs, world, layout));
+        if largest <= options.parameter_tolerance {
+            // Not taken, so that the adjustment of an adjusted problem changes nothing.
+            outcome.termination = Termination::ParameterTolerance;
+            break;
+        }
         let small_change = decrease.abs() <= options.function_tolerance * outcome.final_cost;
         if accepted {
             std::mem::swap(state, &mut candidate);
             outcome.final_cost = new_cost;
             outcome.steps_taken += 1;
-            region.accept(ratio);
+            region.accept(if unseen { 1.0 } else { ratio });
         } else {
             region.reject();
         }
-        if small_step || small_change {
-            outcome.termination = if small_change { Termination::FunctionTolerance } else { Termination::ParameterTolerance };
+        if small_change && !unseen {
+            outcome.termination = Termination::FunctionTolerance;
             break;
         }
         if accepted {

@@ -5,6 +5,7 @@
 //! the points into a system whose `pattern` is dense or sparse; `solve_reduced` factorises it; `step` goes back to the
 //! points and evaluates; `lm` decides. `kernels` has the inner loops, `pieces` the parallel ones.
 
+mod conjugate;
 mod error;
 mod kernels;
 mod layout;

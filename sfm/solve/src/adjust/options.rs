@@ -11,11 +11,13 @@ pub struct AdjustOptions {
     pub loss: Loss,
     /// The largest number of steps tried, rejected ones included. Default 50.
     pub max_iterations: usize,
-    /// Stop when a step changes the cost by less than this share of it. Default 1e-6.
+    /// Stop when a step changes the cost by less than this share of it. Default 1e-6; with 0 only the other tolerances count.
     pub function_tolerance: f64,
     /// Stop when no component of the gradient is larger. Default 1e-10.
     pub gradient_tolerance: f64,
-    /// Stop when the norm of a step is less than this share of the norm of the parameters. Default 1e-8.
+    /// Stop when a step would move no parameter by more than this share: points and translations of the larger of their norm and the size
+    /// of the world (the root mean square of the points' norms), camera parameters of the larger of their value and 1, rotations in
+    /// radians. Such a step is not taken: the adjustment of an adjusted problem leaves it as it is. Default 1e-8.
     pub parameter_tolerance: f64,
     /// Radius of the first trust region: the first damping is the diagonal of the normal equations divided by it.
     /// Default 1e4: nearly a Gauss-Newton step. Smaller values are for poor start values.

@@ -1,13 +1,23 @@
 //! Which blocks of the reduced system are stored, and where.
 
-use super::layout::{Incidence, Layout, NONE, Slot};
+use super::layout::{Incidence, Layout, NONE, Owner, Slot};
 use super::lengths::KeptNormal;
+use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::linalg::amd;
 
 /// Reduced systems up to this size are dense whatever their pattern.
 const DENSE_UNKNOWNS: usize = 300;
 /// Larger ones are dense when at least this share of their lower triangle is. Measured on chains of frames: with 100 frames
 /// the solutions take the same time at a share of 0.4, with 200 frames the sparse one takes half the time at 0.5.
 const DENSE_SHARE: f64 = 0.5;
+/// A factorisation of more operations than this is compared with conjugate gradients; below, it takes about a second.
+const DIRECT_OPERATIONS: f64 = 2e10;
+/// What a step by conjugate gradients costs, in operations of a factorisation a value of W: some 30 products with it, which wait for memory.
+const ITERATIVE_OPERATIONS: f64 = 600.0;
+/// Conjugate gradients keep the blocks of sensors, cameras and kept points with all others: they must be few.
+const MAX_SHARED_UNKNOWNS: usize = 1000;
+/// Unknowns of a cluster of frames, of which the preconditioner keeps all blocks.
+const CLUSTER_UNKNOWNS: usize = 600;
 
 /// Layout of the panels of [`super::schur`].
 #[derive(Debug)]
@@ -16,9 +26,58 @@ pub(super) struct Pattern {
     pub panel_start: Vec<usize>,
     /// Rows of each panel.
     pub stride: Vec<usize>,
-    /// `None` when each panel has all rows of the matrix.
-    pub sparse: Option<SparsePattern>,
+    pub kind: Kind,
     offsets: Vec<usize>,
+}
+
+/// How much of the matrix is stored.
+#[derive(Debug)]
+pub(super) enum Kind {
+    /// Each panel has all rows of the matrix.
+    Dense,
+    /// The blocks that meet.
+    Sparse(SparsePattern),
+    /// What conjugate gradients keep.
+    Clusters(Clusters),
+}
+
+/// Blocks of frames in clusters of consecutive ones, and of what frames share with each other: sensors, cameras, kept points. Stored are the blocks
+/// inside a cluster and all blocks with something shared.
+#[derive(Debug)]
+pub(super) struct Clusters {
+    /// First block of each cluster, and the end of the last, which is where the shared blocks begin.
+    pub start: Vec<usize>,
+    /// The end of the cluster of each block of a frame.
+    end_of: Vec<u32>,
+}
+
+impl Clusters {
+    fn new(layout: &Layout, cluster_unknowns: usize) -> Self {
+        let frames = layout.owners.iter().take_while(|o| matches!(o, Owner::Frame(_))).count();
+        let count = layout.offsets[frames].div_ceil(cluster_unknowns).max(1);
+        let start: Vec<usize> = (0..=count).map(|i| i * frames / count).collect();
+        let end_of = start.windows(2).flat_map(|w| std::iter::repeat_n(w[1] as u32, w[1] - w[0])).collect();
+        Self { start, end_of }
+    }
+
+    /// The first shared block.
+    pub fn shared(&self) -> usize {
+        self.start[self.start.len() - 1]
+    }
+
+    /// Rows of the panel of block `a` before the shared ones.
+    pub fn own_rows(&self, a: usize, offsets: &[usize]) -> usize {
+        self.end_of.get(a).map_or(0, |&end| offsets[end as usize] - offsets[a])
+    }
+
+    fn row(&self, a: usize, b: u32, offsets: &[usize]) -> Option<usize> {
+        let b = b as usize;
+        let shared = self.shared();
+        if a >= shared || self.end_of[a] as usize > b {
+            return Some(offsets[b] - offsets[a]);
+        }
+        (b >= shared).then(|| self.own_rows(a, offsets) + offsets[b] - offsets[shared])
+    }
 }
 
 /// Rows of the panels of a sparse system.
@@ -29,18 +88,51 @@ pub(super) struct SparsePattern {
     pub rows_start: Vec<usize>,
     /// First row of each product of the elimination, by point: see [`super::layout::Slot::first_product`].
     product_rows: Vec<u32>,
+    /// Order of elimination with little fill, by block.
+    order: Vec<usize>,
+}
+
+impl SparsePattern {
+    /// The order of elimination by unknown.
+    pub fn unknown_order(&self, layout: &Layout) -> Vec<usize> {
+        self.order.iter().flat_map(|&b| layout.offsets[b]..layout.offsets[b + 1]).collect()
+    }
 }
 
 impl Pattern {
     pub fn new(layout: &Layout, kept: &KeptNormal) -> Self {
         let n = layout.unknowns();
-        if n > DENSE_UNKNOWNS {
-            let met = Meetings::new(layout, kept);
-            if (met.values(layout) as f64) < DENSE_SHARE * (n * n) as f64 / 2.0 {
-                return Self::from_meetings(layout, &met);
-            }
+        if n <= DENSE_UNKNOWNS {
+            return Self::dense(layout);
         }
-        Self::dense(layout)
+        let met = Meetings::new(layout, kept);
+        let is_sparse = (met.values(layout) as f64) < DENSE_SHARE * (n * n) as f64 / 2.0;
+        let order = if is_sparse { met.order() } else { Vec::new() };
+        let operations = if is_sparse { met.operations(layout, &order) } else { (n as f64).powi(3) / 3.0 };
+        let frames = layout.owners.iter().take_while(|o| matches!(o, Owner::Frame(_))).count();
+        let shared = n - layout.offsets[frames];
+        let is_hard = operations > DIRECT_OPERATIONS.max(ITERATIVE_OPERATIONS * layout.w_len() as f64);
+        if is_hard && shared <= MAX_SHARED_UNKNOWNS && frames > 0 {
+            Self::clustered(layout, CLUSTER_UNKNOWNS)
+        } else if is_sparse {
+            Self::from_meetings(layout, &met, order)
+        } else {
+            Self::dense(layout)
+        }
+    }
+
+    pub fn clustered(layout: &Layout, cluster_unknowns: usize) -> Self {
+        let clusters = Clusters::new(layout, cluster_unknowns);
+        let offsets = &layout.offsets;
+        let mut pattern = Self { panel_start: vec![0], stride: Vec::new(), kind: Kind::Dense, offsets: offsets.clone() };
+        for a in 0..layout.block_count() {
+            let shared = offsets[layout.block_count()] - offsets[a.max(clusters.shared())];
+            let rows = clusters.own_rows(a, offsets) + shared;
+            pattern.stride.push(rows);
+            pattern.panel_start.push(pattern.panel_start[a] + rows * layout.dim(a));
+        }
+        pattern.kind = Kind::Clusters(clusters);
+        pattern
     }
 
     pub fn dense(layout: &Layout) -> Self {
@@ -48,19 +140,21 @@ impl Pattern {
         Self {
             panel_start: layout.offsets.iter().map(|o| o * n).collect(),
             stride: vec![n; layout.block_count()],
-            sparse: None,
+            kind: Kind::Dense,
             offsets: layout.offsets.clone(),
         }
     }
 
     #[cfg(test)]
     pub fn sparse(layout: &Layout, kept: &KeptNormal) -> Self {
-        Self::from_meetings(layout, &Meetings::new(layout, kept))
+        let met = Meetings::new(layout, kept);
+        let order = met.order();
+        Self::from_meetings(layout, &met, order)
     }
 
-    fn from_meetings(layout: &Layout, met: &Meetings) -> Self {
-        let mut pattern = Self { panel_start: vec![0], stride: Vec::new(), sparse: None, offsets: layout.offsets.clone() };
-        let mut sparse = SparsePattern { rows: Vec::new(), rows_start: vec![0], product_rows: Vec::new() };
+    fn from_meetings(layout: &Layout, met: &Meetings, order: Vec<usize>) -> Self {
+        let mut pattern = Self { panel_start: vec![0], stride: Vec::new(), kind: Kind::Dense, offsets: layout.offsets.clone() };
+        let mut sparse = SparsePattern { rows: Vec::new(), rows_start: vec![0], product_rows: Vec::new(), order };
         for a in 0..layout.block_count() {
             let mut row = 0;
             for b in met.of(a) {
@@ -80,8 +174,16 @@ impl Pattern {
                 sparse.product_rows.push(rows[from].1);
             }
         }
-        pattern.sparse = Some(sparse);
+        pattern.kind = Kind::Sparse(sparse);
         pattern
+    }
+
+    /// The clusters, where only they are stored.
+    pub fn clusters(&self) -> Option<&Clusters> {
+        match &self.kind {
+            Kind::Clusters(clusters) => Some(clusters),
+            _ => None,
+        }
     }
 
     /// Number of stored values.
@@ -89,23 +191,30 @@ impl Pattern {
         self.panel_start[self.panel_start.len() - 1]
     }
 
-    /// First row of block `b` in the panel of block `a`, which meets it.
-    pub fn row(&self, a: usize, b: u32) -> usize {
-        match &self.sparse {
-            None => self.offsets[b as usize],
-            Some(sparse) => {
+    /// First row of block `b` in the panel of block `a`, which meets it; `None` where it is not stored.
+    pub fn row(&self, a: usize, b: u32) -> Option<usize> {
+        match &self.kind {
+            Kind::Dense => Some(self.offsets[b as usize]),
+            Kind::Sparse(sparse) => {
                 let rows = &sparse.rows[sparse.rows_start[a]..sparse.rows_start[a + 1]];
-                rows[rows.partition_point(|r| r.0 < b)].1 as usize
+                Some(rows[rows.partition_point(|r| r.0 < b)].1 as usize)
             }
+            Kind::Clusters(clusters) => clusters.row(a, b, &self.offsets),
         }
     }
 
-    /// First row of a product of the elimination, which is with `block`.
+    /// First row of the diagonal block in the panel of block `a`.
+    pub fn diagonal_row(&self, a: usize) -> usize {
+        if matches!(self.kind, Kind::Dense) { self.offsets[a] } else { 0 }
+    }
+
+    /// First row of a product of the elimination, which is of blocks `a` and `b`.
     #[inline(always)]
-    pub fn product_row(&self, product: usize, block: u32) -> usize {
-        match &self.sparse {
-            None => self.offsets[block as usize],
-            Some(sparse) => sparse.product_rows[product] as usize,
+    pub fn product_row(&self, product: usize, a: usize, b: u32) -> Option<usize> {
+        match &self.kind {
+            Kind::Dense => Some(self.offsets[b as usize]),
+            Kind::Sparse(sparse) => Some(sparse.product_rows[product] as usize),
+            Kind::Clusters(clusters) => clusters.row(a, b, &self.offsets),
         }
     }
 }
@@ -142,6 +251,62 @@ impl Meetings {
             let sets = std::iter::successors(Some(bits).filter(|&b| b != 0), next);
             sets.map(move |bits| 64 * word + bits.trailing_zeros() as usize)
         })
+    }
+
+    /// An order of elimination with little fill: approximate minimum degree (Amestoy, Davis & Duff, 1996) of the blocks, which takes a small
+    /// part of the time that it takes of the unknowns.
+    fn order(&self) -> Vec<usize> {
+        let blocks = self.bits.len() / self.words;
+        // Both triangles, by columns.
+        let mut columns = vec![Vec::new(); blocks];
+        for a in 0..blocks {
+            for b in self.of(a).filter(|&b| b != a) {
+                columns[a].push(b);
+                columns[b].push(a);
+            }
+        }
+        let mut start = vec![0];
+        let mut rows = Vec::new();
+        for column in &mut columns {
+            column.sort_unstable();
+            rows.extend_from_slice(column);
+            start.push(rows.len());
+        }
+        let structure = SymbolicSparseColMatRef::new_checked(blocks, blocks, &start, None, &rows);
+        let (mut order, mut inverse) = (vec![0; blocks], vec![0; blocks]);
+        let mut memory = faer::dyn_stack::MemBuffer::new(amd::order_scratch::<usize>(blocks, rows.len()));
+        let stack = faer::dyn_stack::MemStack::new(&mut memory);
+        match amd::order(&mut order, &mut inverse, structure, amd::Control::default(), stack) {
+            Ok(_) => order,
+            Err(_) => (0..blocks).collect(),
+        }
+    }
+
+    /// Operations of a Cholesky factorisation in the given order, about.
+    fn operations(&self, layout: &Layout, order: &[usize]) -> f64 {
+        let blocks = order.len();
+        let mut place = vec![0; blocks];
+        order.iter().enumerate().for_each(|(i, &b)| place[b] = i);
+        let mut below = vec![Vec::new(); blocks];
+        for a in 0..blocks {
+            for b in self.of(a).filter(|&b| b != a) {
+                below[place[a].min(place[b])].push(place[a].max(place[b]));
+            }
+        }
+        // The rows of a column join those of its parent, the first of them (Liu 1990).
+        let mut operations = 0.0;
+        for k in 0..blocks {
+            let mut rows = std::mem::take(&mut below[k]);
+            rows.sort_unstable();
+            rows.dedup();
+            let dim = layout.dim(order[k]) as f64;
+            let length: usize = rows.iter().map(|&r| layout.dim(order[r])).sum();
+            operations += dim * (length as f64 + dim).powi(2);
+            if let Some((&parent, rest)) = rows.split_first() {
+                below[parent].extend_from_slice(rest);
+            }
+        }
+        operations
     }
 
     /// Number of values of all panels.

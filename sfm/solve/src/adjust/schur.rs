@@ -25,7 +25,7 @@ use super::kernels::subtract_product;
 use super::layout::{Layout, NONE};
 use super::lengths::KeptNormal;
 use super::linearise::{Linearised, PointNormal};
-use super::pattern::Pattern;
+use super::pattern::{Clusters, Pattern};
 use super::pieces::{Sliced, for_each_piece};
 use scene::camera::MAX_CAMERA_PARAMS;
 
@@ -56,6 +56,8 @@ pub(super) struct Reduced {
     pub gradient: Vec<f64>,
     /// Diagonal of D_B.
     pub damping: Vec<f64>,
+    /// B of the diagonal blocks of frames, by columns, where conjugate gradients need them.
+    pub frame_normals: Vec<f64>,
     /// C_p^-1, lower triangle by rows, by slot.
     pub point_inverse: Vec<[f64; 6]>,
     groups: Groups,
@@ -78,6 +80,7 @@ impl Reduced {
             rhs: vec![0.0; n],
             gradient: vec![0.0; n],
             damping: vec![0.0; n],
+            frame_normals: vec![0.0; 36 * pattern.clusters().map_or(0, Clusters::shared)],
             point_inverse: vec![[0.0; 6]; layout.slot_count()],
             groups: Groups::new(layout, &pattern, groups),
             avx2: has_avx2(),
@@ -106,15 +109,16 @@ impl Reduced {
             Sliced::new(&mut self.values, &groups.values),
             Sliced::new(&mut self.rhs, &groups.unknowns),
             Sliced::new(&mut self.gradient, &groups.unknowns),
-            Sliced::new(&mut self.damping, &groups.unknowns),
+            (Sliced::new(&mut self.damping, &groups.unknowns), Sliced::new(&mut self.frame_normals, &groups.normals)),
         );
-        for_each_piece(0..groups.blocks.len() - 1, data, parallel, &|group, (values, rhs, gradient, added)| {
+        for_each_piece(0..groups.blocks.len() - 1, data, parallel, &|group, (values, rhs, gradient, (added, normals))| {
             let panels = Panels {
                 blocks: groups.blocks[group]..groups.blocks[group + 1],
                 values: values.into_inner(),
                 rhs: rhs.into_inner(),
                 gradient: gradient.into_inner(),
                 added: added.into_inner(),
+                normals: normals.into_inner(),
             };
             panels.build(&input, avx2);
         });
@@ -135,13 +139,16 @@ struct Groups {
     blocks: Vec<usize>,
     values: Vec<usize>,
     unknowns: Vec<usize>,
+    /// Into [`Reduced::frame_normals`].
+    normals: Vec<usize>,
 }
 
 impl Groups {
     /// At least `count` groups of about the same work where there are that many blocks, and more where the panels of a
     /// group would not fit the cache. The grouping decides which thread sums an element, not in which order it is summed.
     fn new(layout: &Layout, pattern: &Pattern, count: usize) -> Self {
-        let mut groups = Self { blocks: vec![0], values: vec![0], unknowns: vec![0] };
+        let frames = pattern.clusters().map_or(0, Clusters::shared);
+        let mut groups = Self { blocks: vec![0], values: vec![0], unknowns: vec![0], normals: vec![0] };
         let most_work = layout.block_products.iter().sum::<usize>() / count.max(1);
         let mut work = 0;
         for a in 0..layout.block_count() {
@@ -151,6 +158,7 @@ impl Groups {
                 groups.blocks.push(a + 1);
                 groups.values.push(pattern.panel_start[a + 1]);
                 groups.unknowns.push(layout.offsets[a + 1]);
+                groups.normals.push(36 * frames.min(a + 1));
                 work = 0;
             }
         }
@@ -175,12 +183,20 @@ struct Panels<'a> {
     rhs: &'a mut [f64],
     gradient: &'a mut [f64],
     added: &'a mut [f64],
+    normals: &'a mut [f64],
 }
 
 impl Panels<'_> {
     fn build(mut self, input: &Input<'_>, avx2: bool) {
         for a in self.blocks.clone() {
             self.panel(input, a).start(input, a);
+        }
+        let (stride, first) = (&input.pattern.stride, self.blocks.start);
+        for (i, normal) in self.normals.as_chunks_mut::<36>().0.iter_mut().enumerate() {
+            let panel = &self.values[input.pattern.panel_start[first + i] - input.pattern.panel_start[first]..];
+            for (j, column) in normal.as_chunks_mut::<6>().0.iter_mut().enumerate() {
+                column.copy_from_slice(&panel[j * stride[first + i]..][..6]);
+            }
         }
         #[cfg(not(target_arch = "x86_64"))]
         debug_assert!(!avx2);
@@ -226,7 +242,7 @@ impl Panels<'_> {
                         panel.rhs[j] += y[j][0] * h[0] + y[j][1] * h[1] + y[j][2] * h[2];
                     }
                     for (k, other) in others.iter().enumerate() {
-                        let row = pattern.product_row(product + k, other.block);
+                        let Some(row) = pattern.product_row(product + k, a, other.block) else { continue };
                         let dim_b = layout.dim(other.block as usize);
                         subtract_product(
                             dim_b,
@@ -290,7 +306,7 @@ impl Panel<'_> {
                 *sum += g;
             }
             for below in (segment as usize..3).filter(|&k| view.block[k] != NONE) {
-                let row = pattern.row(a, view.block[below]);
+                let Some(row) = pattern.row(a, view.block[below]) else { continue };
                 let (start, dim_b) = (view.start[below] as usize, view.dim(below));
                 for j in 0..dim_a {
                     let from = &h[(first + j) * d + start..][..dim_b];
@@ -302,7 +318,7 @@ impl Panel<'_> {
         }
         let first_pair = kept.pairs.partition_point(|&(c, _, _)| (c as usize) < a);
         for &(_, b, start) in kept.pairs[first_pair..].iter().take_while(|&&(c, _, _)| c as usize == a) {
-            let (row, dim_b) = (pattern.row(a, b), layout.dim(b as usize));
+            let (Some(row), dim_b) = (pattern.row(a, b), layout.dim(b as usize)) else { continue };
             for j in 0..dim_a {
                 for i in 0..dim_b {
                     self.values[j * stride + row + i] += kept.values[start + j * dim_b + i];
@@ -312,7 +328,7 @@ impl Panel<'_> {
     }
 
     fn damp(&mut self, pattern: &Pattern, a: usize, radius: f64) {
-        let row = pattern.row(a, a as u32);
+        let row = pattern.diagonal_row(a);
         for (j, added) in self.added.iter_mut().enumerate() {
             let diagonal = &mut self.values[j * pattern.stride[a] + row + j];
             *added = damping(*diagonal, radius);
@@ -323,7 +339,7 @@ impl Panel<'_> {
 
 /// (h + D)^-1 of a point. A direction in which the point is not determined at all gets a tiny pivot instead of none: the
 /// trust region then rejects a wild step, and the other points do not suffer.
-fn damped_inverse(h: &[f64; 6], radius: f64) -> [f64; 6] {
+pub(super) fn damped_inverse(h: &[f64; 6], radius: f64) -> [f64; 6] {
     let [h00, h10, h11, h20, h21, h22] = *h;
     let (d0, d1, d2) = (h00 + damping(h00, radius), h11 + damping(h11, radius), h22 + damping(h22, radius));
     let l00 = d0.sqrt();

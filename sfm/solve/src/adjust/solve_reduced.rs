@@ -1,67 +1,69 @@
-//! Cholesky factorisation of the reduced system, by faer: dense, or sparse with one symbolic analysis for all iterations.
+//! Solution of the reduced system: Cholesky factorisation by faer, dense or sparse with one symbolic analysis for all iterations, or conjugate
+//! gradients.
 //!
 //! Everything runs on one thread: faer's single-column solve gives other bits on several, and its sparse factorisation
 //! is slower there.
 
+use super::conjugate::{Conjugate, System};
 use super::error::AdjustError;
 use super::layout::Layout;
-use super::pattern::{Pattern, SparsePattern};
+use super::pattern::{Kind, Pattern, SparsePattern};
 use super::schur::Reduced;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::{factor, solve};
+use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
 /// Symbolic analysis and workspace.
-pub(super) struct Solver {
-    workspace: MemBuffer,
-    sparse: Option<Sparse>,
+pub(super) enum Solver {
+    Dense(MemBuffer),
+    Sparse(Sparse),
+    Conjugate(Conjugate),
 }
 
-struct Sparse {
+pub(super) struct Sparse {
     column_start: Vec<usize>,
     row_index: Vec<usize>,
     symbolic: SymbolicCholesky<usize>,
     factor: Vec<f64>,
+    workspace: MemBuffer,
 }
 
 impl Solver {
     pub fn new(layout: &Layout, pattern: &Pattern) -> Result<Self, AdjustError> {
         let unknowns = layout.unknowns();
         let out_of_memory = AdjustError::OutOfMemory { unknowns };
-        let (request, sparse) = match &pattern.sparse {
-            None => (factor::cholesky_in_place_scratch::<f64>(unknowns, Par::Seq, Default::default()), None),
-            Some(rows) => {
-                let sparse = Sparse::new(layout, pattern, rows).ok_or(out_of_memory.clone())?;
-                let request = StackReq::or(
-                    sparse.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
-                    sparse.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
-                );
-                (request, Some(sparse))
+        match &pattern.kind {
+            Kind::Dense => {
+                let request = factor::cholesky_in_place_scratch::<f64>(unknowns, Par::Seq, Default::default());
+                MemBuffer::try_new(request).map(Self::Dense).map_err(|_| out_of_memory)
             }
-        };
-        let workspace = MemBuffer::try_new(request).map_err(|_| out_of_memory)?;
-        Ok(Self { workspace, sparse })
+            Kind::Sparse(rows) => Sparse::new(layout, pattern, rows).map(Self::Sparse).ok_or(out_of_memory),
+            Kind::Clusters(clusters) => Ok(Self::Conjugate(Conjugate::new(layout, clusters))),
+        }
     }
 
     /// Turns the right-hand side of `reduced` into the step; false when the matrix is not positive definite.
-    pub fn solve(&mut self, reduced: &mut Reduced) -> bool {
+    pub fn solve(&mut self, system: &System<'_>, reduced: &mut Reduced) -> bool {
         let n = reduced.rhs.len();
         if n == 0 {
             return true;
         }
-        let stack = MemStack::new(&mut self.workspace);
-        let rhs = MatMut::from_column_major_slice_mut(&mut reduced.rhs, n, 1);
-        match &mut self.sparse {
-            None => {
+        match self {
+            Self::Dense(workspace) => {
+                let stack = MemStack::new(workspace);
+                let rhs = MatMut::from_column_major_slice_mut(&mut reduced.rhs, n, 1);
                 let mut matrix = MatMut::from_column_major_slice_mut(&mut reduced.values, n, n);
                 if factor::cholesky_in_place(matrix.as_mut(), Default::default(), Par::Seq, stack, Default::default()).is_err() {
                     return false;
                 }
                 solve::solve_in_place(matrix.as_ref(), rhs, Par::Seq, stack);
             }
-            Some(sparse) => {
+            Self::Sparse(sparse) => {
+                let stack = MemStack::new(&mut sparse.workspace);
+                let rhs = MatMut::from_column_major_slice_mut(&mut reduced.rhs, n, 1);
                 let structure = SymbolicSparseColMatRef::new_checked(n, n, &sparse.column_start, None, &sparse.row_index);
                 let matrix = SparseColMatRef::new(structure, &reduced.values);
                 let factored = sparse.symbolic.factorize_numeric_llt(
@@ -77,6 +79,11 @@ impl Solver {
                     return false;
                 };
                 factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
+            }
+            Self::Conjugate(conjugate) => {
+                if !conjugate.solve(system, reduced) {
+                    return false;
+                }
             }
         }
         reduced.rhs.iter().all(|d| d.is_finite())
@@ -99,9 +106,17 @@ impl Sparse {
             }
         }
         let structure = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &row_index);
-        let symbolic =
-            factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, CholeskySymbolicParams::default()).ok()?;
+        let order = rows.unknown_order(layout);
+        let mut inverse = vec![0; n];
+        order.iter().enumerate().for_each(|(i, &u)| inverse[u] = i);
+        let order = SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n));
+        let symbolic = factorize_symbolic_cholesky(structure, Side::Lower, order, CholeskySymbolicParams::default()).ok()?;
+        let request = StackReq::or(
+            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+        );
+        let workspace = MemBuffer::try_new(request).ok()?;
         let factor = vec![0.0; symbolic.len_val()];
-        Some(Self { column_start, row_index, symbolic, factor })
+        Some(Self { column_start, row_index, symbolic, factor, workspace })
     }
 }

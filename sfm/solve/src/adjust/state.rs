@@ -111,18 +111,25 @@ impl State {
         }
     }
 
-    /// Squared norm of the kept parameters; of a pose the translation.
-    pub fn kept_norm_squared(&self, layout: &Layout) -> f64 {
-        let norm = |&owner: &Owner| match owner {
-            Owner::Frame(i) => self.frames[i as usize].translation.norm_squared(),
-            Owner::Sensor(i) => self.sensors[i as usize].translation.norm_squared(),
-            Owner::Camera(i) => {
-                let params = self.cameras[i as usize].params();
-                layout.camera_free[i as usize].indices().map(|k| params[k] * params[k]).sum()
+    /// The largest relative change of a kept parameter by `step`: see [`super::AdjustOptions::parameter_tolerance`].
+    pub fn largest_step(&self, step: &[f64], world: f64, layout: &Layout) -> f64 {
+        let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let share = |d: &[f64], value: f64| norm(d) / value.max(world).max(f64::MIN_POSITIVE);
+        let pose = |d: &[f64], pose: &Rigid3| norm(&d[..3]).max(share(&d[3..], pose.translation.norm()));
+        let of = |(b, &owner): (usize, &Owner)| {
+            let d = &step[layout.offsets[b]..layout.offsets[b + 1]];
+            match owner {
+                Owner::Frame(i) => pose(d, &self.frames[i as usize]),
+                Owner::Sensor(i) => pose(d, &self.sensors[i as usize]),
+                Owner::Camera(i) => {
+                    let params = self.cameras[i as usize].params();
+                    let free = layout.camera_free[i as usize].indices();
+                    free.zip(d).map(|(k, d)| d.abs() / params[k].abs().max(1.0)).fold(0.0, f64::max)
+                }
+                Owner::Point(i) => share(d, self.kept_points[i as usize].norm()),
             }
-            Owner::Point(i) => self.kept_points[i as usize].norm_squared(),
         };
-        layout.owners.iter().map(norm).sum()
+        layout.owners.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 }
 

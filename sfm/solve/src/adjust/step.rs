@@ -1,12 +1,19 @@
 //! Back-substitution of the points, and the cost of the state that a step leads to.
 
 use super::layout::Layout;
-use super::linearise::{Linearised, robust_weight};
+use super::linearise::{Linearised, ObservationJacobian, PointNormal, linearise_observation, robust_weight};
 use super::pieces::{Sliced, for_each_piece};
-use super::schur::{Reduced, damping, point_step};
+use super::schur::{Reduced, damped_inverse, damping, point_step};
 use super::state::State;
 use crate::robust::Loss;
 use nalgebra::Vector3;
+
+/// A point whose cost a step changes by more than this, half of what a right observation has, is adjusted alone: points with a wrong observation
+/// or a narrow angle bend more than the linear model knows, and would shorten the steps of all others.
+const RISE: f64 = 0.5;
+const SETTLE_STEPS: usize = 5;
+const SETTLE_RADIUS: f64 = 100.0;
+const SETTLED: f64 = 0.01;
 
 /// What the points' part of a step sums up to.
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,16 +22,30 @@ pub(super) struct StepSums {
     pub cost: f64,
     /// Decrease of the cost that the linear model promises.
     pub model_decrease: f64,
-    pub step_norm_squared: f64,
-    pub points_norm_squared: f64,
+    /// Largest step of a point, and of one relative to its norm.
+    step_max: f64,
+    relative_max: f64,
+    norm_squared: f64,
 }
 
 impl StepSums {
     fn add(&mut self, other: &Self) {
         self.cost += other.cost;
         self.model_decrease += other.model_decrease;
-        self.step_norm_squared += other.step_norm_squared;
-        self.points_norm_squared += other.points_norm_squared;
+        self.step_max = self.step_max.max(other.step_max);
+        self.relative_max = self.relative_max.max(other.relative_max);
+        self.norm_squared += other.norm_squared;
+    }
+
+    /// Root mean square of the norms of the points.
+    pub fn world_size(&self, points: usize) -> f64 {
+        (self.norm_squared / points.max(1) as f64).sqrt()
+    }
+
+    /// The largest relative change of a point: see [`super::AdjustOptions::parameter_tolerance`].
+    pub fn largest_step(&self, world: f64) -> f64 {
+        // A point's own norm counts where it is larger than the world.
+        self.relative_max.min(if world > 0.0 { self.step_max / world } else { f64::INFINITY })
     }
 }
 
@@ -32,11 +53,19 @@ impl StepSums {
 #[derive(Debug)]
 pub(super) struct Stepper {
     sums: Vec<StepSums>,
+    /// Whether points that the linear model serves badly are adjusted alone.
+    settles: bool,
 }
 
 impl Stepper {
     pub fn new(layout: &Layout) -> Self {
-        Self { sums: vec![StepSums::default(); layout.piece_count()] }
+        Self { sums: vec![StepSums::default(); layout.piece_count()], settles: true }
+    }
+
+    /// Takes the step of the linear model as it is from now on.
+    #[cfg(test)]
+    pub fn linear(self) -> Self {
+        Self { settles: false, ..self }
     }
 
     /// Moves the points of `to`, whose kept blocks are already moved, and evaluates it. `reduced.rhs` is the step.
@@ -58,7 +87,7 @@ impl Stepper {
         parallel: bool,
     ) -> StepSums {
         let mut points = std::mem::take(&mut to.points);
-        let target: &State = to;
+        let (target, settles): (&State, bool) = (to, self.settles);
         let data = (Sliced::new(&mut points, &layout.pieces.slots), Sliced::new(&mut self.sums, &layout.pieces.ones));
         for_each_piece(0..layout.piece_count(), data, parallel, &|piece, (points, sums)| {
             let first = layout.pieces.slots[piece];
@@ -72,13 +101,18 @@ impl Stepper {
                     *point = *old;
                     cost = slot_cost(layout, target, loss, s, point);
                 }
+                if settles && layout.slots[s].free && (cost - linear.points[s].cost).abs() > RISE {
+                    cost = settle(layout, target, loss, s, point, cost);
+                }
                 sum.cost += cost;
                 let normal = &linear.points[s];
                 for (i, diagonal) in [normal.h[0], normal.h[2], normal.h[5]].into_iter().enumerate() {
                     sum.model_decrease += 0.5 * step[i] * (damping(diagonal, radius) * step[i] - normal.g[i]);
-                    sum.step_norm_squared += step[i] * step[i];
-                    sum.points_norm_squared += old[i] * old[i];
                 }
+                let (length, norm) = (Vector3::from(step).norm(), Vector3::from(*old).norm());
+                sum.step_max = sum.step_max.max(length);
+                sum.relative_max = sum.relative_max.max(if length > 0.0 { length / norm } else { 0.0 });
+                sum.norm_squared += norm * norm;
             }
             sums.into_inner()[0] = sum;
         });
@@ -87,10 +121,39 @@ impl Stepper {
         self.sums.iter().for_each(|s| total.add(s));
         for ((d, g), added) in reduced.rhs.iter().zip(&reduced.gradient).zip(&reduced.damping) {
             total.model_decrease += 0.5 * d * (added * d - g);
-            total.step_norm_squared += d * d;
         }
         total
     }
+}
+
+/// Adjusts a point alone, by a few steps of Levenberg & Marquardt; returns the cost of its observations.
+fn settle(layout: &Layout, state: &State, loss: &Loss, s: usize, point: &mut [f64; 3], mut cost: f64) -> f64 {
+    let mut j = ObservationJacobian::default();
+    let observations = &layout.obs[layout.slots[s].first_obs as usize..layout.slots[s + 1].first_obs as usize];
+    let mut radius = SETTLE_RADIUS;
+    for _ in 0..SETTLE_STEPS {
+        let mut normal = PointNormal::default();
+        for o in observations {
+            if !linearise_observation(layout, state, loss, point, o, &mut j) {
+                return cost;
+            }
+            normal.add(&j);
+        }
+        let step = point_step(&normal, &damped_inverse(&normal.h, radius), &[0.0; 3]);
+        let moved = [point[0] + step[0], point[1] + step[1], point[2] + step[2]];
+        let new = slot_cost(layout, state, loss, s, &moved);
+        if new < cost {
+            (*point, radius) = (moved, radius * 10.0);
+            let gain = cost - new;
+            cost = new;
+            if gain < SETTLED * cost {
+                break;
+            }
+        } else {
+            radius /= 100.0;
+        }
+    }
+    cost
 }
 
 fn back_substitute(layout: &Layout, linear: &Linearised, reduced: &Reduced, s: usize) -> [f64; 3] {

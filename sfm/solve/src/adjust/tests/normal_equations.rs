@@ -2,6 +2,7 @@
 
 use super::oracle::{Unknown, jacobian, residuals, unknowns};
 use super::scene::{Options, free_camera, perturb, truth};
+use crate::adjust::conjugate::System;
 use crate::adjust::layout::{Layout, Owner};
 use crate::adjust::lengths::KeptNormal;
 use crate::adjust::linearise::Linearised;
@@ -49,11 +50,14 @@ fn iterate(problem: &Problem, make_pattern: impl Fn(&Layout, &KeptNormal) -> Pat
     let cost = linear.update(&layout, &state, &loss, false) + kept.update(problem, &layout, &state, &loss);
     let mut reduced = Reduced::with_pattern(&layout, make_pattern(&layout, &kept), 2);
     let mut solver = Solver::new(&layout, &reduced.pattern).expect("memory");
+    if let Solver::Conjugate(conjugate) = &mut solver {
+        conjugate.solve_exactly();
+    }
     reduced.build(&layout, &linear, &kept, RADIUS, false);
-    assert!(solver.solve(&mut reduced));
+    assert!(solver.solve(&System { layout: &layout, linear: &linear, kept: &kept, parallel: false }, &mut reduced));
     let mut after = state.clone();
     assert!(after.set_moved(&state, &reduced.rhs, &layout));
-    let sums = Stepper::new(&layout).step(&layout, &linear, &reduced, RADIUS, &loss, &state, &mut after, false);
+    let sums = Stepper::new(&layout).linear().step(&layout, &linear, &reduced, RADIUS, &loss, &state, &mut after, false);
     let (mut step, mut gradient) = (reduced.rhs.clone(), reduced.gradient.clone());
     for (s, slot) in layout.slots[..layout.slot_count()].iter().enumerate().filter(|(_, s)| s.free) {
         step.extend((0..3).map(|k| after.points[s][k] - state.points[s][k]));
@@ -144,6 +148,19 @@ fn a_sparse_step_solves_the_normal_equations() {
 }
 
 #[test]
+fn conjugate_gradients_solve_the_normal_equations() {
+    for sensors in [1, 3] {
+        // One frame a cluster, two, and all.
+        for unknowns in [6, 12, 1000] {
+            check(&everything(CameraModel::OpenCv, sensors), |layout, _| Pattern::clustered(layout, unknowns));
+        }
+    }
+    let mut nothing_shared = truth(&Options { frames: 9, points: 40, track: 3, arc: 0.05, noise_px: 0.5, ..Options::default() });
+    perturb(&mut nothing_shared, 0.01, 4);
+    check(&nothing_shared, |layout, _| Pattern::clustered(layout, 18));
+}
+
+#[test]
 fn fixed_blocks_have_no_unknowns() {
     let mut problem = everything(CameraModel::Radial, 3);
     problem.sensors.iter_mut().for_each(|s| s.free = false);
@@ -167,7 +184,9 @@ fn vector_width_and_grouping_change_no_bit() {
     let mut kept = KeptNormal::new(&problem, &layout, &state, &Loss::Trivial);
     linear.update(&layout, &state, &Loss::Trivial, false);
     kept.update(&problem, &layout, &state, &Loss::Trivial);
-    for make_pattern in [|l: &Layout, _: &KeptNormal| Pattern::dense(l), Pattern::sparse] {
+    for make_pattern in
+        [|l: &Layout, _: &KeptNormal| Pattern::dense(l), Pattern::sparse, |l: &Layout, _: &KeptNormal| Pattern::clustered(l, 6)]
+    {
         let build = |threads: usize, portable: bool| {
             let mut reduced = Reduced::with_pattern(&layout, make_pattern(&layout, &kept), threads);
             if portable {
