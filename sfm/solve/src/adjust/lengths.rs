@@ -108,6 +108,18 @@ impl KeptNormal {
         self.visit(problem, layout, state, loss, |_| {})
     }
 
+    /// Calls `row` with the blocks of each residual and its gradients with respect to them, in the order of the problem.
+    pub fn visit_rows(
+        &self,
+        problem: &Problem,
+        layout: &Layout,
+        state: &State,
+        loss: &Loss,
+        mut row: impl FnMut(&[u32], &[[f64; MAX_CAMERA_PARAMS]]),
+    ) {
+        self.visit(problem, layout, state, loss, |r| row(&r.blocks[..r.count], &r.gradients[..r.count]));
+    }
+
     fn visit(&self, problem: &Problem, layout: &Layout, state: &State, loss: &Loss, mut row: impl FnMut(&Row)) -> f64 {
         let mut cost = 0.0;
         let mut square = |r: Row| {

@@ -6,6 +6,7 @@
 //! points and evaluates; `lm` decides. `kernels` has the inner loops, `pieces` the parallel ones.
 
 mod conjugate;
+mod covariance;
 mod error;
 mod kernels;
 mod layout;
@@ -24,6 +25,7 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
+pub use covariance::{Covariance, CovarianceError, centre_covariance, covariance};
 pub use error::AdjustError;
 pub use lm::adjust;
 pub use options::{AdjustOptions, Loss};

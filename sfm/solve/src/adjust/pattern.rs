@@ -203,6 +203,18 @@ impl Pattern {
         }
     }
 
+    /// Calls `row` with each block of which the panel of block `a` has rows, in order.
+    pub fn for_rows(&self, a: usize, mut row: impl FnMut(usize)) {
+        let blocks = self.offsets.len() - 1;
+        match &self.kind {
+            Kind::Dense => (0..blocks).for_each(row),
+            Kind::Sparse(sparse) => {
+                sparse.rows[sparse.rows_start[a]..sparse.rows_start[a + 1]].iter().for_each(|&(b, _)| row(b as usize));
+            }
+            Kind::Clusters(clusters) => (a..blocks).filter(|&b| clusters.row(a, b as u32, &self.offsets).is_some()).for_each(row),
+        }
+    }
+
     /// First row of the diagonal block in the panel of block `a`.
     pub fn diagonal_row(&self, a: usize) -> usize {
         if matches!(self.kind, Kind::Dense) { self.offsets[a] } else { 0 }

@@ -14,7 +14,7 @@ use faer::linalg::cholesky::llt::{factor, solve};
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use faer::{Conj, MatMut, MatRef, Par, Side};
 
 /// Symbolic analysis and workspace.
 pub(super) enum Solver {
@@ -87,6 +87,24 @@ impl Solver {
             }
         }
         reduced.rhs.iter().all(|d| d.is_finite())
+    }
+    /// Solves for more right-hand sides, by columns, with the factor of the last [`Solver::solve`]; `None` where there is none to solve with again.
+    pub fn solve_again(&self, reduced: &Reduced, columns: &mut [f64], count: usize) -> Option<()> {
+        let n = reduced.rhs.len();
+        let rhs = MatMut::from_column_major_slice_mut(columns, n, count);
+        match self {
+            Self::Dense(_) => {
+                let factor = MatRef::from_column_major_slice(&reduced.values, n, n);
+                solve::solve_in_place(factor, rhs, Par::Seq, MemStack::new(&mut []));
+            }
+            Self::Sparse(sparse) => {
+                let mut memory = MemBuffer::try_new(sparse.symbolic.solve_in_place_scratch::<f64>(count, Par::Seq)).ok()?;
+                let factor = LltRef::new(&sparse.symbolic, &sparse.factor);
+                factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut memory));
+            }
+            Self::Conjugate(_) => return None,
+        }
+        Some(())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Tests of the adjuster.
 
+mod covariance;
 mod edges;
 mod lengths;
 mod normal_equations;

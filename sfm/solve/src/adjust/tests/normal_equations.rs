@@ -27,7 +27,7 @@ struct Iteration {
 }
 
 /// Unknowns in the adjuster's order.
-fn layout_order(problem: &Problem, layout: &Layout) -> Vec<Unknown> {
+pub(super) fn layout_order(problem: &Problem, layout: &Layout) -> Vec<Unknown> {
     let kept = layout.owners.iter().flat_map(|&owner| match owner {
         Owner::Frame(i) => (0..6).map(|k| Unknown::Frame(i as usize, k)).collect::<Vec<_>>(),
         Owner::Sensor(i) => (0..6).map(|k| Unknown::Sensor(i as usize, k)).collect(),
@@ -94,7 +94,7 @@ fn check(problem: &Problem, make_pattern: impl Fn(&Layout, &KeptNormal) -> Patte
 }
 
 /// A rig of three with free sensors, cameras, lengths and priors: every kind of block and residual.
-fn everything(model: CameraModel, sensors: usize) -> Problem {
+pub(super) fn everything(model: CameraModel, sensors: usize) -> Problem {
     let mut problem = truth(&Options { frames: 4, sensors, points: 14, track: 3, noise_px: 0.5, model, ..Options::default() });
     problem.cameras.iter_mut().for_each(free_camera);
     problem.cameras[0].priors[0] = Some(ParamPrior { value: 890.0, sigma: 5.0 });

@@ -1,0 +1,139 @@
+//! Covariances against dense algebra, and against what noise does.
+
+use super::normal_equations::{everything, layout_order};
+use super::oracle::{Unknown, jacobian};
+use super::scene::{Options, free_camera, truth};
+use crate::adjust::layout::Layout;
+use crate::adjust::state::State;
+use crate::adjust::*;
+use crate::lie::so3_log;
+use crate::testing::Random;
+use ::scene::{CameraModel, Rigid3};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector6};
+
+/// (J^T J)^-1 from the definitions, and its unknowns.
+fn dense(problem: &Problem) -> (Vec<Unknown>, DMatrix<f64>, DMatrix<f64>) {
+    let mut state = State::new(problem);
+    let layout = Layout::new(problem, &mut state);
+    let order = layout_order(problem, &layout);
+    let j = jacobian(problem, &order);
+    let inverse = (j.transpose() * &j).try_inverse().expect("determined");
+    (order, j, inverse)
+}
+
+fn block<const N: usize>(order: &[Unknown], inverse: &DMatrix<f64>, first: Unknown) -> nalgebra::SMatrix<f64, N, N> {
+    let at = order.iter().position(|u| *u == first).expect("free");
+    inverse.fixed_view::<N, N>(at, at).into_owned()
+}
+
+#[test]
+fn covariances_are_blocks_of_the_inverse() {
+    for sensors in [1, 3] {
+        let problem = everything(CameraModel::Radial, sensors);
+        let (order, j, inverse) = dense(&problem);
+        let found = covariance(&problem, &Loss::Trivial).expect("determined");
+        // The Jacobian by differences errs by 1e-9; the inverse magnifies it.
+        let near = |a: &[f64], b: &[f64]| {
+            let size = b.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5 * size)
+        };
+        for f in 1..4 {
+            let expected: Matrix6<f64> = block(&order, &inverse, Unknown::Frame(f, 0));
+            assert!(near(found.frames[f].expect("free").as_slice(), expected.as_slice()), "frame {f}");
+        }
+        assert!(found.frames[0].is_none() && found.points[3].is_none());
+        for p in (0..14).filter(|p| ![3, 5].contains(p)) {
+            let expected: Matrix3<f64> = block(&order, &inverse, Unknown::Point(p, 0));
+            assert!(near(found.points[p].expect("free").as_slice(), expected.as_slice()), "point {p}");
+        }
+        let expected: nalgebra::Matrix5<f64> = block(&order, &inverse, Unknown::Camera(0, 0));
+        assert!(near(found.cameras[0].as_ref().expect("free").as_slice(), expected.as_slice()));
+        if sensors > 1 {
+            let expected: Matrix6<f64> = block(&order, &inverse, Unknown::Sensor(2, 0));
+            assert!(near(found.sensors[2].expect("free").as_slice(), expected.as_slice()));
+        }
+        // The diagonal of I - J Cov J^T, whose sum is the total.
+        let hat = &j * &inverse * j.transpose();
+        let others = j.nrows() - 2 * problem.observations.len();
+        assert_eq!(found.redundancy.len(), others);
+        let lengths = problem.baselines.len() + problem.scale_bars.len();
+        for (i, r) in found.redundancy[..lengths].iter().enumerate() {
+            let row = 2 * problem.observations.len() + i;
+            assert!((r - (1.0 - hat[(row, row)])).abs() < 1e-5, "length {i}: {r}");
+        }
+        assert!((found.total_redundancy - (j.nrows() as f64 - hat.trace())).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn a_world_that_floats_has_none() {
+    let floating = truth(&Options::default());
+    assert_eq!(covariance(&floating, &Loss::Trivial), Err(CovarianceError::Singular));
+    let mut no_scale = floating;
+    no_scale.frames[0].free = false;
+    assert_eq!(covariance(&no_scale, &Loss::Trivial), Err(CovarianceError::Singular));
+    no_scale.baselines = vec![Baseline { a: (0, 0), b: (5, 0), length: 1.0, sigma: 0.01 }];
+    assert!(covariance(&no_scale, &Loss::Trivial).is_ok());
+}
+
+/// The step (w, d) from one pose to another.
+fn error(found: &Rigid3, truth: &Rigid3) -> Vector6<f64> {
+    let w = so3_log(&(truth.rotation * found.rotation.inverse()));
+    let d = truth.translation - found.translation;
+    Vector6::new(w.x, w.y, w.z, d.x, d.y, d.z)
+}
+
+/// Normalised squared errors of the pose of one frame and of the position of one point, summed over many seeds.
+fn consistency(sensors: usize, rigid: bool, seeds: u64) -> (f64, f64) {
+    let (mut of_frame, mut of_point) = (0.0, 0.0);
+    for seed in 0..seeds {
+        let options = Options { frames: 8, sensors, points: 60, track: 5, noise_px: 0.7, seed: 100 + seed, ..Options::default() };
+        let mut truth = truth(&options);
+        truth.frames[0].free = false;
+        truth.observations.iter_mut().for_each(|o| o.sigma_px = 0.7);
+        let mut random = Random::new(seed);
+        if rigid {
+            truth.cameras.iter_mut().for_each(free_camera);
+            let length = (truth.sensors[0].pose.centre() - truth.sensors[1].pose.centre()).norm();
+            truth.baselines.push(Baseline { a: (0, 0), b: (0, 1), length: length + 0.002 * random.normal(), sigma: 0.002 });
+        } else {
+            for f in 1..8 {
+                let length = (truth.frames[f - 1].pose.centre() - truth.frames[f].pose.centre()).norm();
+                let (a, b) = ((f as u32 - 1, 0), (f as u32, 0));
+                truth.baselines.push(Baseline { a, b, length: length + 0.002 * random.normal(), sigma: 0.002 });
+            }
+        }
+        let mut problem = truth.clone();
+        adjust(&mut problem, &AdjustOptions { function_tolerance: 1e-12, ..AdjustOptions::default() }).expect("valid");
+        let found = covariance(&problem, &Loss::Trivial).expect("determined");
+        let e = error(&problem.frames[5].pose, &truth.frames[5].pose);
+        of_frame += e.dot(&(found.frames[5].expect("free").try_inverse().expect("positive") * e));
+        let e = problem.points[30].xyz - truth.points[30].xyz;
+        of_point += e.dot(&(found.points[30].expect("free").try_inverse().expect("positive") * e));
+    }
+    (of_frame, of_point)
+}
+
+#[test]
+fn errors_are_as_large_as_the_covariance_says() {
+    // Sums of chi-square variables with 6 and 3 degrees of freedom a seed: the normal approximation's 95 % band.
+    let band = |degrees: f64| (degrees - 1.96 * (2.0 * degrees).sqrt())..(degrees + 1.96 * (2.0 * degrees).sqrt());
+    for (sensors, rigid) in [(1, false), (2, true)] {
+        let seeds = 100;
+        let (of_frame, of_point) = consistency(sensors, rigid, seeds);
+        assert!(band(6.0 * seeds as f64).contains(&of_frame), "rigid {rigid}: {}", of_frame / seeds as f64);
+        assert!(band(3.0 * seeds as f64).contains(&of_point), "rigid {rigid}: {}", of_point / seeds as f64);
+    }
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let mut problem = truth(&Options { frames: 60, points: 900, track: 4, arc: 0.05, noise_px: 0.5, ..Options::default() });
+    problem.frames[30].free = false;
+    problem.baselines = vec![Baseline { a: (0, 0), b: (59, 0), length: 1.0, sigma: 0.01 }];
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| covariance(&problem, &Loss::Trivial).expect("determined"))
+    };
+    assert!(on(1) == on(2));
+}
