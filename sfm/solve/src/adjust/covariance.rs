@@ -34,7 +34,8 @@ pub struct Covariance {
     pub cameras: Vec<Option<DMatrix<f64>>>,
     /// Of each free point.
     pub points: Vec<Option<Matrix3<f64>>>,
-    /// Part of the redundancy of each scalar residual that is not an image observation, in the order baselines, scale bars, and then the others: 1
+    /// Part of the redundancy of each scalar residual that is not an image observation, in the order baselines, scale bars, axes of
+    /// control points, priors of frames, sensors and camera parameters, axes of positions, directions (two each), headings: 1
     /// where the rest of the problem says nothing of it less than a hundred times better, 0 where nothing checks it (Baarda 1968).
     pub redundancy: Vec<f64>,
     /// Number of scalar residuals minus the number of unknowns.
@@ -82,7 +83,7 @@ pub fn covariance(problem: &Problem, loss: &Loss) -> Result<Covariance, Covarian
     let layout = Layout::new(problem, &mut state);
     state.load_points(problem, &layout);
     let mut linear = Linearised::new(&layout);
-    let mut kept = KeptNormal::new(problem, &layout, &state, loss);
+    let mut kept = KeptNormal::new(problem, &layout, &state, loss, Loss::Trivial);
     linear.update(&layout, &state, loss, true);
     kept.update(problem, &layout, &state, loss);
     let pattern = Pattern::new(&layout, &kept);

@@ -1,6 +1,7 @@
 //! Why a problem cannot be adjusted, and the check of the input.
 
 use super::problem::{PoseBlock, Problem};
+use nalgebra::Vector3;
 use scene::Rigid3;
 use thiserror::Error;
 
@@ -119,7 +120,38 @@ pub(super) fn validate(problem: &Problem) -> Result<(), AdjustError> {
         in_range("scale bar", index, "point", b.b, points)?;
         length("scale bar", index, b.length, b.sigma, b.a == b.b)?;
     }
+    instruments(problem)
+}
+
+fn instruments(problem: &Problem) -> Result<(), AdjustError> {
+    let (frames, all) = (problem.frames.len(), |v: &Vector3<f64>| v.iter().all(|x| x.is_finite()));
+    for (index, o) in problem.positions.iter().enumerate() {
+        in_range("position", index, "frame", o.frame, frames)?;
+        finite("position", index, "xyz or in_rig", all(&o.xyz) && all(&o.in_rig))?;
+        axes("position", index, &o.sigma)?;
+    }
+    for (index, o) in problem.directions.iter().enumerate() {
+        in_range("direction", index, "frame", o.frame, frames)?;
+        finite("direction", index, "in_rig or in_world", all(&o.in_rig) && all(&o.in_world))?;
+        positive("direction", index, "length", o.in_rig.norm().min(o.in_world.norm()))?;
+        positive("direction", index, "sigma_rad", o.sigma_rad)?;
+    }
+    for (index, o) in problem.headings.iter().enumerate() {
+        in_range("heading", index, "frame", o.frame, frames)?;
+        finite("heading", index, "heading_rad or axis_in_rig", o.heading_rad.is_finite() && all(&o.axis_in_rig))?;
+        positive("heading", index, "sigma_rad", o.sigma_rad)?;
+    }
+    for (index, o) in problem.control_points.iter().enumerate() {
+        in_range("control point", index, "point", o.point, problem.points.len())?;
+        finite("control point", index, "xyz", all(&o.xyz))?;
+        axes("control point", index, &o.sigma)?;
+    }
     Ok(())
+}
+
+/// Each positive or infinite.
+fn axes(item: &'static str, index: usize, sigma: &Vector3<f64>) -> Result<(), AdjustError> {
+    sigma.iter().try_for_each(|&s| if s == f64::INFINITY { Ok(()) } else { positive(item, index, "sigma", s) })
 }
 
 fn poses(item: &'static str, blocks: &[PoseBlock]) -> Result<(), AdjustError> {

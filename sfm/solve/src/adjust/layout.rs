@@ -1,7 +1,7 @@
 //! How a problem lies in memory while it is adjusted.
 //!
 //! The unknowns are split: **eliminated** are the free points, **kept** are the blocks of the reduced system, in this
-//! order: frames (6), sensors (6), cameras (their free parameters), points at the end of a scale bar (3). A scale bar
+//! order: frames (6), sensors (6), cameras (their free parameters), points at the end of a scale bar and control points (3). A scale bar
 //! couples two points, and elimination needs each point to meet only kept blocks, so these few points are kept.
 //!
 //! Observations are sorted by point. Each point owns consecutive *incidences*, one for every kept block that its
@@ -116,7 +116,7 @@ pub(super) struct Layout {
     pub sensor_block: Vec<u32>,
     pub camera_block: Vec<u32>,
     pub camera_free: Vec<FreeParams>,
-    /// Points at the end of a scale bar, ascending, and their blocks.
+    /// Points at the end of a scale bar and control points, ascending, and their blocks.
     pub kept_points: Vec<u32>,
     pub kept_block: Vec<u32>,
     /// Observations of kept points, with their views.
@@ -250,6 +250,10 @@ impl Layout {
             used_frames[frame as usize] = true;
             used_sensors[sensor as usize] = true;
         }
+        let of_sensors = problem.positions.iter().map(|o| o.frame).chain(problem.directions.iter().map(|o| o.frame));
+        for frame in of_sensors.chain(problem.headings.iter().map(|o| o.frame)) {
+            used_frames[frame as usize] = true;
+        }
         self.offsets.push(0);
         self.frame_block = vec![NONE; problem.frames.len()];
         for (i, block) in problem.frames.iter().enumerate() {
@@ -275,7 +279,7 @@ impl Layout {
             }
             self.camera_free.push(free);
         }
-        self.kept_points = problem.scale_bars.iter().flat_map(|b| [b.a, b.b]).collect();
+        self.kept_points = problem.scale_bars.iter().flat_map(|b| [b.a, b.b]).chain(problem.control_points.iter().map(|o| o.point)).collect();
         self.kept_points.sort_unstable();
         self.kept_points.dedup();
         for i in 0..self.kept_points.len() {

@@ -3,8 +3,9 @@
 //! There are few of them, so they are added one by one, in order.
 
 use super::layout::{Layout, NONE, Obs, Owner};
-use super::linearise::{ObservationJacobian, linearise_observation};
+use super::linearise::{ObservationJacobian, linearise_observation, robust_weight};
 use super::problem::{PosePrior, Problem};
+use super::sensors::{control_point_rows, direction_rows, heading_row, position_rows};
 use super::state::State;
 use super::summary::LengthResidual;
 use crate::lie::{so3_left_jacobian_inverse, so3_log};
@@ -15,7 +16,7 @@ use scene::camera::MAX_CAMERA_PARAMS;
 
 /// One scalar residual and its gradient with respect to up to four kept blocks.
 #[derive(Default)]
-struct Row {
+pub(super) struct Row {
     residual: f64,
     count: usize,
     blocks: [u32; 4],
@@ -23,12 +24,12 @@ struct Row {
 }
 
 impl Row {
-    fn new(residual: f64) -> Self {
+    pub fn new(residual: f64) -> Self {
         Self { residual, ..Self::default() }
     }
 
     /// Adds the gradient with respect to a block; a block met twice has one gradient, the sum.
-    fn add(&mut self, block: u32, gradient: &[f64]) {
+    pub fn add(&mut self, block: u32, gradient: &[f64]) {
         if block == NONE {
             return;
         }
@@ -38,6 +39,11 @@ impl Row {
         for (sum, g) in self.gradients[i].iter_mut().zip(gradient) {
             *sum += g;
         }
+    }
+
+    fn scale(&mut self, factor: f64) {
+        self.residual *= factor;
+        self.gradients[..self.count].iter_mut().flatten().for_each(|g| *g *= factor);
     }
 }
 
@@ -50,15 +56,17 @@ pub(super) struct KeptNormal {
     pub values: Vec<f64>,
     pub gradient: Vec<f64>,
     observations: Vec<(Obs, u32)>,
+    /// Loss of positions, directions and headings.
+    sensor_loss: Loss,
 }
 
 impl KeptNormal {
-    pub fn new(problem: &Problem, layout: &Layout, state: &State, loss: &Loss) -> Self {
+    pub fn new(problem: &Problem, layout: &Layout, state: &State, loss: &Loss, sensor_loss: Loss) -> Self {
         let observation = |(view, o): &(u32, super::ImageObservation)| {
             let kept = layout.kept_points.partition_point(|&p| p < o.point) as u32;
             (Obs { view: *view, incidence: [NONE; 3], pixel: o.pixel.into(), inverse_sigma: 1.0 / o.sigma_px }, kept)
         };
-        let mut normal = Self { observations: layout.kept_observations.iter().map(observation).collect(), ..Self::default() };
+        let mut normal = Self { observations: layout.kept_observations.iter().map(observation).collect(), sensor_loss, ..Self::default() };
         let mut pairs = Vec::new();
         normal.visit(problem, layout, state, loss, |row| {
             let blocks = &row.blocks[..row.count];
@@ -132,6 +140,9 @@ impl KeptNormal {
         for b in &problem.scale_bars {
             square(scale_bar_row(layout, state, b));
         }
+        for o in &problem.control_points {
+            control_point_rows(layout, state, o, &mut square);
+        }
         for (b, &owner) in layout.owners.iter().enumerate() {
             match owner {
                 Owner::Frame(i) => {
@@ -158,6 +169,28 @@ impl KeptNormal {
                 Owner::Point(_) => {}
             }
         }
+        // The rows of an observation share its weight.
+        let mut rows: Vec<Row> = Vec::new();
+        let mut weigh = |rows: &mut Vec<Row>| {
+            let (rho, root) = robust_weight(&self.sensor_loss, rows.iter().map(|r| r.residual * r.residual).sum());
+            cost += 0.5 * rho;
+            for mut r in rows.drain(..) {
+                r.scale(root);
+                row(&r);
+            }
+        };
+        for o in &problem.positions {
+            position_rows(layout, state, o, |r| rows.push(r));
+            weigh(&mut rows);
+        }
+        for o in &problem.directions {
+            direction_rows(layout, state, o, |r| rows.push(r));
+            weigh(&mut rows);
+        }
+        for o in &problem.headings {
+            rows.push(heading_row(layout, state, o));
+            weigh(&mut rows);
+        }
         let mut j = ObservationJacobian::default();
         for (o, kept) in &self.observations {
             let x = state.kept_points[*kept as usize];
@@ -179,15 +212,18 @@ impl KeptNormal {
     }
 }
 
-/// Number of scalar residuals of the priors on kept blocks.
-pub(super) fn prior_residuals(problem: &Problem, layout: &Layout) -> usize {
+/// Number of scalar residuals of instruments, control points and priors on kept blocks.
+pub(super) fn other_residuals(problem: &Problem, layout: &Layout) -> usize {
     let count = |owner: &Owner| match *owner {
         Owner::Frame(i) => 6 * usize::from(problem.frames[i as usize].prior.is_some()),
         Owner::Sensor(i) => 6 * usize::from(problem.sensors[i as usize].prior.is_some()),
         Owner::Camera(i) => layout.camera_free[i as usize].indices().filter(|&k| problem.cameras[i as usize].priors[k].is_some()).count(),
         Owner::Point(_) => 0,
     };
-    layout.owners.iter().map(count).sum()
+    let axes = |sigma: &Vector3<f64>| sigma.iter().filter(|s| s.is_finite()).count();
+    let instruments = problem.positions.iter().map(|o| axes(&o.sigma)).sum::<usize>() + 2 * problem.directions.len() + problem.headings.len();
+    let control = problem.control_points.iter().map(|o| axes(&o.sigma)).sum::<usize>();
+    layout.owners.iter().map(count).sum::<usize>() + instruments + control
 }
 
 /// Baselines and scale bars at `state`.

@@ -3,7 +3,7 @@
 use super::conjugate::System;
 use super::error::{AdjustError, validate};
 use super::layout::{Layout, Owner};
-use super::lengths::{KeptNormal, length_residuals, prior_residuals};
+use super::lengths::{KeptNormal, length_residuals, other_residuals};
 use super::linearise::Linearised;
 use super::options::AdjustOptions;
 use super::problem::Problem;
@@ -82,7 +82,7 @@ fn minimise(problem: &Problem, options: &AdjustOptions, layout: &Layout, state: 
     let loss = &options.loss;
     let parallel = layout.obs.len() >= PARALLEL_OBSERVATIONS && rayon::current_num_threads() > 1;
     let mut linear = Linearised::new(layout);
-    let mut kept = KeptNormal::new(problem, layout, state, loss);
+    let mut kept = KeptNormal::new(problem, layout, state, loss, options.sensor_loss);
     let cost = linear.update(layout, state, loss, parallel) + kept.update(problem, layout, state, loss);
     let mut outcome = Outcome {
         initial_cost: cost,
@@ -181,7 +181,7 @@ fn summarise(problem: &Problem, layout: &Layout, state: &State, outcome: &Outcom
         gradient_max: outcome.gradient_max,
         observations,
         observations_left_out: layout.left_out,
-        residuals: 2 * observations + baselines.len() + scale_bars.len() + prior_residuals(problem, layout),
+        residuals: 2 * observations + baselines.len() + scale_bars.len() + other_residuals(problem, layout),
         free,
         reprojection: ReprojectionErrors::of(&mut reprojection_errors(layout, state)),
         baselines,

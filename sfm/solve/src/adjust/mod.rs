@@ -18,6 +18,7 @@ mod pattern;
 mod pieces;
 mod problem;
 mod schur;
+mod sensors;
 mod solve_reduced;
 mod state;
 mod step;
@@ -29,5 +30,8 @@ pub use covariance::{Covariance, CovarianceError, centre_covariance, covariance}
 pub use error::AdjustError;
 pub use lm::adjust;
 pub use options::{AdjustOptions, Loss};
-pub use problem::{Baseline, CameraBlock, ImageObservation, ParamPrior, PointBlock, PoseBlock, PosePrior, Problem, ScaleBar};
+pub use problem::{
+    Baseline, CameraBlock, ControlPoint, DirectionObservation, HeadingObservation, ImageObservation, ParamPrior, PointBlock, PoseBlock, PosePrior,
+    PositionObservation, Problem, ScaleBar,
+};
 pub use summary::{AdjustSummary, LengthResidual, ParameterCounts, ReprojectionErrors, Termination};

@@ -6,9 +6,11 @@ pub use crate::robust::Loss;
 /// Settings of [`crate::adjust::adjust`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdjustOptions {
-    /// Loss of the image observations. Lengths and priors always enter squared: an error in one shall show in its
-    /// residual, not vanish.
+    /// Loss of the image observations. Lengths, control points and priors always enter squared: an error in one shall show in
+    /// its residual, not vanish.
     pub loss: Loss,
+    /// Loss of each position, direction and heading, in units of their standard deviations: instruments fail. Default none.
+    pub sensor_loss: Loss,
     /// The largest number of steps tried, rejected ones included. Default 50.
     pub max_iterations: usize,
     /// Stop when a step changes the cost by less than this share of it. Default 1e-6; with 0 only the other tolerances count.
@@ -28,6 +30,7 @@ impl Default for AdjustOptions {
     fn default() -> Self {
         Self {
             loss: Loss::Trivial,
+            sensor_loss: Loss::Trivial,
             max_iterations: 50,
             function_tolerance: 1e-6,
             gradient_tolerance: 1e-10,
@@ -50,7 +53,10 @@ impl AdjustOptions {
                 return Err(AdjustError::BadOption { name, value });
             }
         }
-        for (name, value) in [("initial_radius", self.initial_radius), ("loss.scale_px", self.loss.scale_px().unwrap_or(1.0))] {
+        let scale = |loss: &Loss| loss.scale_px().unwrap_or(1.0);
+        let positive =
+            [("initial_radius", self.initial_radius), ("loss.scale_px", scale(&self.loss)), ("sensor_loss.scale_px", scale(&self.sensor_loss))];
+        for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(AdjustError::BadOption { name, value });
             }

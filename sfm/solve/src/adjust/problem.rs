@@ -126,6 +126,59 @@ pub struct ScaleBar {
     pub sigma: f64,
 }
 
+/// A measured place of a point of the rig, such as an antenna or a pressure sensor: the residual along each axis of the world is
+/// (R^T (`in_rig` - t) - `xyz`) / sigma.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionObservation {
+    /// Index of the frame.
+    pub frame: u32,
+    /// The point in the frame of the rig: the lever arm.
+    pub in_rig: Vector3<f64>,
+    /// Where it was, in the unit of the world.
+    pub xyz: Vector3<f64>,
+    /// Standard deviation along each axis of the world; infinite where it was not measured: a depth is a position with a z only.
+    pub sigma: Vector3<f64>,
+}
+
+/// A direction of the world that was measured in the frame of the rig, such as that of gravity: two residuals, the sines of the angles across it divided
+/// by sigma.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DirectionObservation {
+    /// Index of the frame.
+    pub frame: u32,
+    /// Measured direction; its length does not matter.
+    pub in_rig: Vector3<f64>,
+    /// Known direction; its length does not matter.
+    pub in_world: Vector3<f64>,
+    /// Standard deviation of each angle, radians.
+    pub sigma_rad: f64,
+}
+
+/// A measured heading of an axis of the rig, clockwise from the y axis (north) of a world whose z axis is up: the residual is the angle by which the
+/// axis, seen from above, deviates, divided by sigma.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeadingObservation {
+    /// Index of the frame.
+    pub frame: u32,
+    /// The axis, in the frame of the rig.
+    pub axis_in_rig: Vector3<f64>,
+    /// Where it points, radians.
+    pub heading_rad: f64,
+    /// Standard deviation, radians.
+    pub sigma_rad: f64,
+}
+
+/// A point with known coordinates: the residual along each axis is (position - `xyz`) / sigma.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControlPoint {
+    /// Index of the point.
+    pub point: u32,
+    /// Known position.
+    pub xyz: Vector3<f64>,
+    /// Standard deviation along each axis of the world; infinite where it is not known.
+    pub sigma: Vector3<f64>,
+}
+
 /// A bundle adjustment problem. Observations name the blocks by index.
 ///
 /// Blocks that nothing refers to are allowed and stay as they are, as do blocks that are not free, at no cost.
@@ -145,4 +198,12 @@ pub struct Problem {
     pub baselines: Vec<Baseline>,
     /// Distances of points.
     pub scale_bars: Vec<ScaleBar>,
+    /// Places of points of the rig.
+    pub positions: Vec<PositionObservation>,
+    /// Directions seen from the rig.
+    pub directions: Vec<DirectionObservation>,
+    /// Headings of the rig.
+    pub headings: Vec<HeadingObservation>,
+    /// Points with known coordinates.
+    pub control_points: Vec<ControlPoint>,
 }

@@ -13,7 +13,7 @@ use crate::adjust::state::State;
 use crate::adjust::step::Stepper;
 use crate::adjust::*;
 use ::scene::CameraModel;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 const RADIUS: f64 = 50.0;
 
@@ -46,7 +46,7 @@ fn iterate(problem: &Problem, make_pattern: impl Fn(&Layout, &KeptNormal) -> Pat
     let layout = Layout::new(problem, &mut state);
     state.load_points(problem, &layout);
     let mut linear = Linearised::new(&layout);
-    let mut kept = KeptNormal::new(problem, &layout, &state, &loss);
+    let mut kept = KeptNormal::new(problem, &layout, &state, &loss, loss);
     let cost = linear.update(&layout, &state, &loss, false) + kept.update(problem, &layout, &state, &loss);
     let mut reduced = Reduced::with_pattern(&layout, make_pattern(&layout, &kept), 2);
     let mut solver = Solver::new(&layout, &reduced.pattern).expect("memory");
@@ -118,6 +118,23 @@ pub(super) fn everything(model: CameraModel, sensors: usize) -> Problem {
         problem.baselines.push(Baseline { a: (2, 0), b: (2, 1), length: 0.31, sigma: 0.005 });
         problem.baselines.push(Baseline { a: (1, 1), b: (3, 1), length: 0.9, sigma: 0.02 });
     }
+    let at = |f: usize, l: Vector3<f64>| problem.frames[f].pose.inverse().apply(&l);
+    let arm = Vector3::new(0.1, -0.4, 0.2);
+    problem.positions = vec![
+        PositionObservation { frame: 1, in_rig: arm, xyz: at(1, arm).add_scalar(0.02), sigma: Vector3::new(0.1, 0.2, 0.05) },
+        PositionObservation { frame: 3, in_rig: Vector3::zeros(), xyz: at(3, Vector3::zeros()), sigma: Vector3::new(f64::INFINITY, f64::INFINITY, 0.02) },
+        PositionObservation { frame: 0, in_rig: arm, xyz: at(0, arm), sigma: Vector3::repeat(0.1) },
+    ];
+    let down = Vector3::new(0.1, 0.9, -0.2);
+    problem.directions = [1, 2].map(|frame| DirectionObservation { frame, in_rig: Vector3::new(0.0, 2.0, 0.1), in_world: down, sigma_rad: 0.03 }).to_vec();
+    problem.headings = [2, 3].map(|frame| HeadingObservation { frame, axis_in_rig: Vector3::z(), heading_rad: 3.0, sigma_rad: 0.1 }).to_vec();
+    problem.control_points = [(7, 0.01), (9, f64::INFINITY), (3, 0.1)]
+        .map(|(point, sigma)| ControlPoint {
+            point,
+            xyz: problem.points[point as usize].xyz.add_scalar(0.03),
+            sigma: Vector3::new(sigma, 0.02, 0.05),
+        })
+        .to_vec();
     perturb(&mut problem, 0.01, 3);
     problem
 }
@@ -181,7 +198,7 @@ fn vector_width_and_grouping_change_no_bit() {
     let layout = Layout::new(&problem, &mut state);
     state.load_points(&problem, &layout);
     let mut linear = Linearised::new(&layout);
-    let mut kept = KeptNormal::new(&problem, &layout, &state, &Loss::Trivial);
+    let mut kept = KeptNormal::new(&problem, &layout, &state, &Loss::Trivial, Loss::Trivial);
     linear.update(&layout, &state, &Loss::Trivial, false);
     kept.update(&problem, &layout, &state, &Loss::Trivial);
     for make_pattern in

@@ -66,6 +66,10 @@ pub fn residuals(problem: &Problem) -> Vec<f64> {
         let [p, q] = [b.a, b.b].map(|p| problem.points[p as usize].xyz);
         all.push(((p - q).norm() - b.length) / b.sigma);
     }
+    for o in &problem.control_points {
+        let difference = problem.points[o.point as usize].xyz - o.xyz;
+        all.extend((0..3).filter(|&k| o.sigma[k].is_finite()).map(|k| difference[k] / o.sigma[k]));
+    }
     for block in problem.frames.iter().chain(&problem.sensors).filter(|b| b.free) {
         if let Some(prior) = &block.prior {
             all.extend((so3_log(&(block.pose.rotation * prior.pose.rotation.inverse())) / prior.sigma_rotation_rad).iter());
@@ -78,6 +82,21 @@ pub fn residuals(problem: &Problem) -> Vec<f64> {
                 all.push((p - prior.value) / prior.sigma);
             }
         }
+    }
+    for o in &problem.positions {
+        let place = problem.frames[o.frame as usize].pose.inverse().apply(&o.in_rig);
+        all.extend((0..3).filter(|&k| o.sigma[k].is_finite()).map(|k| (place - o.xyz)[k] / o.sigma[k]));
+    }
+    for o in &problem.directions {
+        // Across the measured direction, in the basis that the adjuster takes: least axis first.
+        let (seen, given) = (problem.frames[o.frame as usize].pose.rotation * o.in_world.normalize(), o.in_rig.normalize());
+        let first = given.cross(&Vector3::ith(given.iamin(), 1.0)).normalize();
+        all.extend([first, given.cross(&first)].map(|b| b.dot(&seen) / o.sigma_rad));
+    }
+    for o in &problem.headings {
+        let axis = problem.frames[o.frame as usize].pose.rotation.inverse() * o.axis_in_rig;
+        let turn = axis.x.atan2(axis.y) - o.heading_rad;
+        all.push(turn.sin().atan2(turn.cos()) / o.sigma_rad);
     }
     all
 }
