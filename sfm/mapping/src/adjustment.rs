@@ -11,7 +11,10 @@ use scene::{FrameId, ImageId, PointId};
 use solve::adjust::{AdjustOptions, AdjustSummary, CameraBlock, ImageObservation, Loss, PointBlock, PoseBlock, PosePrior, Problem, adjust};
 
 /// Standard deviation of the end of a scale bar that somebody or a detector picked in an image, pixels.
-const PICK_SIGMA_PX: f64 = 1.0;
+pub(crate) const PICK_SIGMA_PX: f64 = 1.0;
+
+/// No parameter of a model moves by a larger share of it when it is adjusted again.
+const PARAMETER_TOLERANCE: f64 = 1e-9;
 
 /// How hard an adjustment of the whole model tries.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +22,13 @@ pub(crate) struct Effort {
     pub loss: Loss,
     pub max_iterations: usize,
     pub function_tolerance: f64,
+}
+
+impl Effort {
+    /// Until nothing moves: the adjustment of what this leaves changes nothing.
+    pub(crate) fn last(options: &OrientOptions) -> Self {
+        Self { loss: options.loss, max_iterations: 200, function_tolerance: 0.0 }
+    }
 }
 
 /// What may move.
@@ -45,6 +55,13 @@ pub(crate) fn adjust_all(
     run(model, &Scope { free_frames: &free_frames, points: &points, calibration: true, lengths }, effort, options)
 }
 
+/// The problem of [`adjust_all`], and where the elements of the model stand in it.
+pub(crate) fn whole_problem(model: &Model, lengths: Option<&Lengths>, options: &OrientOptions) -> (Problem, ProblemMap) {
+    let free_frames = vec![true; model.frames.len()];
+    let points: Vec<PointId> = model.points().map(|(id, _)| id).collect();
+    build(model, &Scope { free_frames: &free_frames, points: &points, calibration: true, lengths }, options)
+}
+
 /// Adjusts the scope and writes the result back.
 pub(crate) fn run(model: &mut Model, scope: &Scope, effort: Effort, options: &OrientOptions) -> Result<AdjustSummary, MapError> {
     let (mut problem, map) = build(model, scope, options);
@@ -52,6 +69,7 @@ pub(crate) fn run(model: &mut Model, scope: &Scope, effort: Effort, options: &Or
         loss: effort.loss,
         max_iterations: effort.max_iterations,
         function_tolerance: effort.function_tolerance,
+        parameter_tolerance: PARAMETER_TOLERANCE,
         ..AdjustOptions::default()
     };
     let summary = adjust(&mut problem, &adjust_options)?;
@@ -60,10 +78,17 @@ pub(crate) fn run(model: &mut Model, scope: &Scope, effort: Effort, options: &Or
 }
 
 /// Where the elements of the model stand in the problem.
-struct ProblemMap {
+pub(crate) struct ProblemMap {
     frames: Vec<Option<u32>>,
     /// First sensor of each rig.
     first_sensor: Vec<u32>,
+}
+
+impl ProblemMap {
+    /// Where a frame stands in the problem.
+    pub(crate) fn frame(&self, frame: usize) -> Option<u32> {
+        self.frames[frame]
+    }
 }
 
 fn build(model: &Model, scope: &Scope, options: &OrientOptions) -> (Problem, ProblemMap) {
@@ -101,7 +126,7 @@ fn build(model: &Model, scope: &Scope, options: &OrientOptions) -> (Problem, Pro
             observations.extend(observe(model, &map, o.image, index, model.pixel(o), model.sigma_px(o)));
         }
     }
-    let mut problem = Problem { cameras, sensors, frames, points, observations, baselines: Vec::new(), scale_bars: Vec::new() };
+    let mut problem = Problem { cameras, sensors, frames, points, observations, ..Problem::default() };
     if let Some(lengths) = scope.lengths {
         lengths.add_to(
             &mut problem,
@@ -113,7 +138,7 @@ fn build(model: &Model, scope: &Scope, options: &OrientOptions) -> (Problem, Pro
 }
 
 /// Frame and sensor of an oriented image in the problem.
-fn sensor_of(model: &Model, map: &ProblemMap, image: ImageId) -> Option<(u32, u32)> {
+pub(crate) fn sensor_of(model: &Model, map: &ProblemMap, image: ImageId) -> Option<(u32, u32)> {
     let frame = model.images[image.index()].frame;
     let rig = model.frames[frame.index()].rig;
     let place = model.rigs[rig.index()].sensors.iter().position(|s| s.camera == model.images[image.index()].camera)?;

@@ -142,11 +142,28 @@ pub(crate) fn finish(model: &mut Model, lengths: Option<&Lengths>, options: &Ori
     refine(model, lengths, Effort { loss: options.loss, max_iterations: 50, function_tolerance: 1e-6 }, options)?;
     retriangulate(model, options);
     refine(model, lengths, Effort { loss: options.loss, max_iterations: 50, function_tolerance: 1e-6 }, options)?;
-    let summary = adjust_all(model, lengths, Effort { loss: options.loss, max_iterations: 100, function_tolerance: 1e-10 }, options)?;
-    filter_points(model, options);
-    // What goes with one frame may have been what held another.
-    while filter_frames(model, MIN_FRAME_OBSERVATIONS) > 0 {}
-    Ok(summary)
+    settle(model, lengths, options)
+}
+
+/// Adjusts until nothing moves and nothing is left to filter.
+pub(crate) fn settle(model: &mut Model, lengths: Option<&Lengths>, options: &OrientOptions) -> Result<AdjustSummary, MapError> {
+    let mut rounds = 0;
+    loop {
+        let summary = adjust_all(model, lengths, Effort::last(options), options)?;
+        rounds += 1;
+        let mut removed = filter_points(model, options);
+        // What goes with one frame may have been what held another.
+        loop {
+            let frames = filter_frames(model, MIN_FRAME_OBSERVATIONS);
+            removed += frames;
+            if frames == 0 {
+                break;
+            }
+        }
+        if removed == 0 || rounds >= MAX_ROUNDS {
+            return Ok(summary);
+        }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq)]

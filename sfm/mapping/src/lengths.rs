@@ -1,13 +1,23 @@
 //! Known lengths: baselines between cameras and scale bars in the scene.
 
-use crate::input::{ImagePick, RigMode, ScaleBarInput};
+use crate::adjustment::PICK_SIGMA_PX;
+use crate::input::{BaselineInput, ImagePick, RigMode, ScaleBarInput};
 use crate::model::Model;
 use crate::summary::{BaselineReport, ScaleBarReport};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use scene::{ImageId, Scale, Similarity3};
 use solve::adjust::{Baseline, ImageObservation, PointBlock, Problem, ScaleBar};
 use solve::triangulate::{View, triangulate};
 use std::collections::BTreeMap;
+
+/// A known length, by its position in the input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LengthId {
+    /// A baseline.
+    Baseline(usize),
+    /// A scale bar.
+    ScaleBar(usize),
+}
 
 /// Baselines and scale bars of a model that take part in its adjustment.
 #[derive(Clone, Debug, Default)]
@@ -18,6 +28,8 @@ pub(crate) struct Lengths {
 
 #[derive(Clone, Debug)]
 struct KnownBaseline {
+    /// Position in the input.
+    given: usize,
     images: (ImageId, ImageId),
     length: f64,
     sigma: f64,
@@ -25,6 +37,8 @@ struct KnownBaseline {
 
 #[derive(Clone, Debug)]
 struct KnownBar {
+    /// Position in the input.
+    given: usize,
     ends: [Vec<ImagePick>; 2],
     start: [Vector3<f64>; 2],
     length: f64,
@@ -39,23 +53,26 @@ impl Lengths {
             RigMode::None => Vec::new(),
             // One pose a frame: a baseline is one and the same in every exposure and counts once.
             RigMode::Rigid if model.rigs.len() == 1 => {
-                rig.baselines.iter().filter_map(|b| Some((b, *simultaneous(model, b.cameras).first()?))).map(known).collect()
+                let first = |(i, b): (usize, &BaselineInput)| Some(known(i, b, *simultaneous(model, b.cameras).first()?));
+                rig.baselines.iter().enumerate().filter_map(first).collect()
             }
             // A rig that could not be solved leaves every image its own pose.
             RigMode::Rigid | RigMode::Baselines => rig
                 .baselines
                 .iter()
-                .flat_map(|b| simultaneous(model, b.cameras).into_iter().map(move |images| known((b, images))))
+                .enumerate()
+                .flat_map(|(i, b)| simultaneous(model, b.cameras).into_iter().map(move |images| known(i, b, images)))
                 .collect(),
         };
         let bars = model
             .input
             .scale_bars
             .iter()
-            .filter(|bar| !bar.check)
-            .filter_map(|bar| {
+            .enumerate()
+            .filter(|(_, bar)| !bar.check)
+            .filter_map(|(given, bar)| {
                 let start = bar_ends(model, bar)?;
-                Some(KnownBar { ends: bar.ends.clone(), start, length: bar.length_m, sigma: bar.sigma_m })
+                Some(KnownBar { given, ends: bar.ends.clone(), start, length: bar.length_m, sigma: bar.sigma_m })
             })
             .collect();
         Self { baselines, bars }
@@ -63,6 +80,33 @@ impl Lengths {
 
     pub(crate) fn is_empty(&self) -> bool {
         self.baselines.is_empty() && self.bars.is_empty()
+    }
+
+    /// For each given baseline that is observed, its position in the input and those of its observations in the problem.
+    pub(crate) fn baseline_groups(&self) -> Vec<(usize, Vec<usize>)> {
+        let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
+        for (i, b) in self.baselines.iter().enumerate() {
+            match groups.last_mut().filter(|(given, _)| *given == b.given) {
+                Some((_, members)) => members.push(i),
+                None => groups.push((b.given, vec![i])),
+            }
+        }
+        groups
+    }
+
+    /// Position in the input of each scale bar that takes part.
+    pub(crate) fn bars_given(&self) -> Vec<usize> {
+        self.bars.iter().map(|bar| bar.given).collect()
+    }
+
+    /// Takes a length out of the adjustment.
+    pub(crate) fn without(&self, which: LengthId) -> Self {
+        let mut rest = self.clone();
+        match which {
+            LengthId::Baseline(given) => rest.baselines.retain(|b| b.given != given),
+            LengthId::ScaleBar(given) => rest.bars.retain(|b| b.given != given),
+        }
+        rest
     }
 
     /// Metres in one unit of the model: the weighted mean over all lengths of given / found.
@@ -105,8 +149,8 @@ impl Lengths {
     }
 }
 
-fn known((baseline, images): (&crate::input::BaselineInput, (ImageId, ImageId))) -> KnownBaseline {
-    KnownBaseline { images, length: baseline.length_m, sigma: baseline.sigma_m }
+fn known(given: usize, baseline: &BaselineInput, images: (ImageId, ImageId)) -> KnownBaseline {
+    KnownBaseline { given, images, length: baseline.length_m, sigma: baseline.sigma_m }
 }
 
 /// Oriented images of both cameras in the same exposure.
@@ -186,13 +230,31 @@ pub(crate) fn report_baselines(model: &Model, scale: Scale) -> Vec<BaselineRepor
 }
 
 /// Given and found scale bars.
-pub(crate) fn report_bars(model: &Model, scale: Scale) -> Vec<ScaleBarReport> {
+pub(crate) fn report_bars(model: &Model, scale: Scale, normalised: &[(LengthId, Option<f64>)]) -> Vec<ScaleBarReport> {
     let bars = model.input.scale_bars.iter().enumerate();
-    bars.map(|(index, bar)| ScaleBarReport {
-        index,
-        given_m: bar.length_m,
-        found_m: bar_ends(model, bar).filter(|_| scale == Scale::Metric).map(|[a, b]| (a - b).norm()),
-        check: bar.check,
+    bars.map(|(index, bar)| {
+        let ends = bar_ends(model, bar).filter(|_| scale == Scale::Metric);
+        let found_m = ends.map(|[a, b]| (a - b).norm());
+        let of_check = || Some((found_m? - bar.length_m) / bar.sigma_m.hypot(picked_sigma(model, bar, &ends?)));
+        let of_used = || normalised.iter().find(|(id, _)| *id == LengthId::ScaleBar(index)).and_then(|(_, w)| *w);
+        let normalised_residual = if bar.check { of_check() } else { of_used() };
+        ScaleBarReport { index, given_m: bar.length_m, found_m, check: bar.check, normalised_residual }
     })
     .collect()
+}
+
+/// Standard deviation of the length between the ends of a bar that comes from the picks alone.
+fn picked_sigma(model: &Model, bar: &ScaleBarInput, ends: &[Vector3<f64>; 2]) -> f64 {
+    let along = (ends[1] - ends[0]).normalize();
+    let variance = |(picks, end): (&Vec<ImagePick>, &Vector3<f64>)| {
+        let mut normal = Matrix3::zeros();
+        for pick in picks {
+            let Some(cam_from_world) = model.cam_from_world(pick.image) else { continue };
+            let Some(p) = model.camera(pick.image).project_with_jacobians(&cam_from_world.apply(end)) else { continue };
+            let j = p.d_point * cam_from_world.rotation_matrix() / PICK_SIGMA_PX;
+            normal += j.transpose() * j;
+        }
+        normal.try_inverse().map_or(f64::INFINITY, |c| along.dot(&(c * along)))
+    };
+    bar.ends.iter().zip(ends).map(variance).sum::<f64>().sqrt()
 }

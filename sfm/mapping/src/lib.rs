@@ -23,6 +23,8 @@ mod lengths;
 mod model;
 mod options;
 mod orient;
+mod quality;
+mod readjust;
 mod register;
 mod rig;
 mod summary;
@@ -31,6 +33,9 @@ mod visibility;
 
 pub use error::MapError;
 pub use input::{BaselineInput, CameraInput, ImageInput, ImagePick, MapInput, RigInput, RigMode, RigPoseInput, ScaleBarInput};
+pub use lengths::LengthId;
 pub use options::OrientOptions;
 pub use orient::orient;
+pub use readjust::readjust;
+pub use quality::{InteriorSigma, PoseSigma, Quality};
 pub use summary::{BaselineReport, LeftOut, OrientSummary, Orientation, ScaleBarReport};

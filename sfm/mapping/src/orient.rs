@@ -5,21 +5,26 @@ use crate::contradiction;
 use crate::error::MapError;
 use crate::frames::{Layout, given_pose, known_rig};
 use crate::graph::CorrespondenceGraph;
-use crate::incremental::{Tries, finish};
+use crate::incremental::{Tries, finish, settle};
 use crate::initial::{from_exposures, from_pairs};
 use crate::input::{MapInput, RigMode};
 use crate::interior::{best_interior, is_plausible};
-use crate::lengths::{Lengths, report_bars, report_baselines, rescale};
+use crate::lengths::{LengthId, Lengths, report_bars, report_baselines, rescale};
 use crate::model::Model;
 use crate::options::OrientOptions;
+use crate::quality::{CRITICAL, Quality, quality};
 use crate::register::Registration;
 use crate::rig::{solve_rig, with_rig};
 use crate::summary::{LeftOut, OrientSummary, Orientation};
 use scene::{Observation, Point, Reconstruction, Rigid3, Scale};
-use solve::adjust::AdjustSummary;
+use solve::adjust::{AdjustSummary, CovarianceError};
 
 /// Models beyond the first that are tried.
 const MAX_FURTHER_MODELS: usize = 4;
+
+/// A length is wrong, and not another, when the square of its normalised residual is larger by this than that of the next: by so much more its
+/// removal lowers the sum of squares, as it would by chance once in e^10 times.
+const CLEARLY: f64 = 20.0;
 
 /// Orients the images.
 ///
@@ -36,6 +41,25 @@ pub fn orient(input: &MapInput, options: &OrientOptions) -> Result<Orientation, 
     let graph = CorrespondenceGraph::new(&counts, &input.pairs);
     let mut notes = Vec::new();
     let done = first_model(input, &graph, options, &mut notes)?;
+    let mut further = Vec::new();
+    let mut taken: Vec<bool> = (0..input.images.len()).map(|i| done.model.is_oriented(scene::ImageId::new(i))).collect();
+    for _ in 0..MAX_FURTHER_MODELS {
+        let Some(next) = further_model(input, &graph, &done, &taken, options)? else { break };
+        for (i, taken) in taken.iter_mut().enumerate() {
+            *taken |= next.model.is_oriented(scene::ImageId::new(i));
+        }
+        notes.extend(contradiction::note(&next.model, options));
+        further.push(reconstruction(&next.model, next.scale));
+    }
+    let mut out = orientation(input, done, notes, options);
+    out.models.extend(further);
+    out.models[1..].sort_by_key(|m| std::cmp::Reverse(m.oriented_images().count()));
+    out.summary.left_out.retain(|left| !taken[left.image.index()]);
+    Ok(out)
+}
+
+/// What is told of a finished model.
+pub(crate) fn orientation(input: &MapInput, done: Done, mut notes: Vec<String>, options: &OrientOptions) -> Orientation {
     for (c, camera) in done.model.cameras.iter().enumerate().filter(|(c, _)| !input.cameras[*c].fixed) {
         if !is_plausible(camera) {
             notes.push(format!(
@@ -46,34 +70,76 @@ pub fn orient(input: &MapInput, options: &OrientOptions) -> Result<Orientation, 
             ));
         }
     }
-    let baselines = report_baselines(&done.model, done.scale);
-    let scale_bars = report_bars(&done.model, done.scale);
-    notes.extend(contradiction::note(&done.model, options));
-    let mut models = vec![reconstruction(&done.model, done.scale)];
-    let mut taken: Vec<bool> = (0..input.images.len()).map(|i| done.model.is_oriented(scene::ImageId::new(i))).collect();
+    let of_lengths = done.quality.as_ref().map_or(&[][..], |q| &q.lengths);
+    notes.extend(length_notes(input, of_lengths, &done.rejected));
+    notes.splice(0..0, contradiction::note(&done.model, options));
     let left_out_reasons = reasons(&done.model, &done.outcomes);
-    for _ in 0..MAX_FURTHER_MODELS {
-        let Some(further) = further_model(input, &graph, &done, &taken, options)? else { break };
-        for (i, taken) in taken.iter_mut().enumerate() {
-            *taken |= further.model.is_oriented(scene::ImageId::new(i));
-        }
-        notes.extend(contradiction::note(&further.model, options));
-        models.push(reconstruction(&further.model, further.scale));
-    }
-    models[1..].sort_by_key(|m| std::cmp::Reverse(m.oriented_images().count()));
-    let left_out = (0..input.images.len())
-        .filter(|&i| !taken[i])
-        .map(|i| LeftOut { image: scene::ImageId::new(i), reason: left_out_reasons[i].clone() })
-        .collect();
-    Ok(Orientation { models, summary: OrientSummary { adjustment: done.adjustment, left_out, baselines, scale_bars, notes } })
+    let left_out = left_out_reasons.into_iter().enumerate().map(|(i, reason)| LeftOut { image: scene::ImageId::new(i), reason });
+    let left_out = left_out.filter(|left| !done.model.is_oriented(left.image)).collect();
+    let baselines = report_baselines(&done.model, done.scale);
+    let scale_bars = report_bars(&done.model, done.scale, of_lengths);
+    let models = vec![reconstruction(&done.model, done.scale)];
+    let Done { adjustment, quality, rejected, .. } = done;
+    Orientation { models, summary: OrientSummary { adjustment, left_out, baselines, scale_bars, quality, rejected, notes } }
 }
 
-struct Done<'a> {
+/// Finishes a model that nobody grew here.
+pub(crate) fn finish_start<'a>(mut model: Model<'a>, mut scale: Scale, options: &OrientOptions) -> Result<Done<'a>, MapError> {
+    let outcomes = vec![None; model.images.len()];
+    if scale == Scale::Arbitrary
+        && let Some(factor) = Lengths::of(&model).scale(&model)
+    {
+        rescale(&mut model, factor);
+        scale = Scale::Metric;
+    }
+    let lengths = Lengths::of(&model);
+    let used = (scale == Scale::Metric && !lengths.is_empty()).then_some(&lengths);
+    let adjustment = settle(&mut model, used, options)?;
+    reject_wrong_lengths(model, (outcomes, scale, lengths, adjustment), options)
+}
+
+/// What the normalised residuals of the lengths say.
+fn length_notes(input: &MapInput, lengths: &[(LengthId, Option<f64>)], rejected: &[(LengthId, f64)]) -> Vec<String> {
+    let name = |id: LengthId| match id {
+        LengthId::Baseline(i) => {
+            let b = &input.rig.baselines[i];
+            let [p, q] = [b.cameras.0, b.cameras.1].map(|c| input.cameras[c.index()].name.as_str());
+            format!("the baseline of {p} and {q} ({} m)", b.length_m)
+        }
+        LengthId::ScaleBar(i) => format!("scale bar {} ({} m)", i + 1, input.scale_bars[i].length_m),
+    };
+    let out = rejected.iter().map(|&(id, w)| {
+        let name = name(id);
+        format!("{name} contradicts the other lengths (normalised residual {w:.1}, at most {CRITICAL} by chance) and was taken out: check it")
+    });
+    let against: Vec<String> = lengths
+        .iter()
+        .filter_map(|&(id, w)| Some((id, w.filter(|w| w.abs() > CRITICAL)?)))
+        .map(|(id, w)| format!("{} ({w:.1})", name(id)))
+        .collect();
+    let undecided = (!against.is_empty()).then(|| {
+        let list = against.join(", ");
+        format!("known lengths contradict each other, and which is wrong cannot be told: {list}, normalised residuals in brackets, at most {CRITICAL} by chance")
+    });
+    out.chain(undecided).collect()
+}
+
+/// A finished model.
+pub(crate) struct Done<'a> {
     model: Model<'a>,
     /// How the last try of each image's frame went.
     outcomes: Vec<Option<Registration>>,
     adjustment: AdjustSummary,
     scale: Scale,
+    quality: Result<Quality, CovarianceError>,
+    rejected: Vec<(LengthId, f64)>,
+}
+
+impl Done<'_> {
+    /// Whether nothing is oriented.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.model.oriented_frames().is_empty()
+    }
 }
 
 /// How the last try of each image's frame went.
@@ -161,14 +227,12 @@ fn on_rig<'a>(
     let layout = Layout::rigid(input, cam_from_rig);
     let empty = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
     let allowed: Vec<bool> = empty.frame_images.iter().map(|images| images.iter().all(|i| !taken[i.index()])).collect();
-    let Some((mut model, tries)) = best_model(&empty, &from_exposures(&empty, &allowed, &options.growing()), &allowed, options)? else {
+    let Some((model, tries)) = best_model(&empty, &from_exposures(&empty, &allowed, &options.growing()), &allowed, options)? else {
         return Ok(None);
     };
     let outcomes = by_image(&model, &tries);
-    let lengths = Lengths::of(&model);
-    let used = (scale == Scale::Metric && !lengths.is_empty()).then_some(&lengths);
-    let adjustment = finish(&mut model, used, options)?;
-    Ok((!model.oriented_frames().is_empty()).then_some(Done { model, outcomes, adjustment, scale }))
+    let done = finish_with_lengths(model, outcomes, scale, options)?;
+    Ok((!done.model.oriented_frames().is_empty()).then_some(done))
 }
 
 /// Metres in one unit of the solved rig, from the cameras whose pose in the rig is given.
@@ -197,11 +261,46 @@ fn finish_metric<'a>(
         rescale(&mut model, factor);
         scale = Scale::Metric;
     }
-    // Ends of scale bars were placed in the old unit.
+    finish_with_lengths(model, outcomes, scale, options)
+}
+
+/// The last adjustments, with the known lengths.
+fn finish_with_lengths<'a>(
+    mut model: Model<'a>,
+    outcomes: Vec<Option<Registration>>,
+    scale: Scale,
+    options: &OrientOptions,
+) -> Result<Done<'a>, MapError> {
     let lengths = Lengths::of(&model);
     let used = (scale == Scale::Metric && !lengths.is_empty()).then_some(&lengths);
     let adjustment = finish(&mut model, used, options)?;
-    Ok(Done { model, outcomes, adjustment, scale })
+    reject_wrong_lengths(model, (outcomes, scale, lengths, adjustment), options)
+}
+
+/// Lengths that contradict the others are taken out of an adjusted model one by one, the worst first.
+fn reject_wrong_lengths<'a>(
+    mut model: Model<'a>,
+    (outcomes, scale, mut lengths, mut adjustment): (Vec<Option<Registration>>, Scale, Lengths, AdjustSummary),
+    options: &OrientOptions,
+) -> Result<Done<'a>, MapError> {
+    let mut rejected = Vec::new();
+    loop {
+        let quality =
+            if model.oriented_frames().is_empty() { Err(CovarianceError::Singular) } else { quality(&model, &lengths, scale, &adjustment, options) };
+        let wrong = quality.as_ref().ok().and_then(|q| wrong_length(&q.lengths));
+        let Some(wrong) = wrong else { return Ok(Done { model, outcomes, adjustment, scale, quality, rejected }) };
+        rejected.push(wrong);
+        lengths = lengths.without(wrong.0);
+        adjustment = settle(&mut model, Some(&lengths), options)?;
+    }
+}
+
+/// The length that the others contradict, where there are enough of them to tell which is wrong.
+fn wrong_length(lengths: &[(LengthId, Option<f64>)]) -> Option<(LengthId, f64)> {
+    let mut ranked: Vec<(LengthId, f64)> = lengths.iter().filter_map(|&(id, w)| Some((id, w?))).collect();
+    ranked.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    let [worst, second, _, ..] = ranked[..] else { return None };
+    (worst.1.abs() > CRITICAL && worst.1.powi(2) > second.1.powi(2) + CLEARLY).then_some(worst)
 }
 
 /// Another model from the images that are in none yet.

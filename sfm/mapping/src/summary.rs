@@ -1,7 +1,9 @@
 //! What came out of an orientation.
 
+use crate::lengths::LengthId;
+use crate::quality::Quality;
 use scene::{CameraId, ImageId, Reconstruction};
-use solve::adjust::AdjustSummary;
+use solve::adjust::{AdjustSummary, CovarianceError};
 
 /// Models and figures.
 #[derive(Clone, Debug)]
@@ -23,6 +25,10 @@ pub struct OrientSummary {
     pub baselines: Vec<BaselineReport>,
     /// Known lengths in the scene and what was found.
     pub scale_bars: Vec<ScaleBarReport>,
+    /// Standard deviations of the first model.
+    pub quality: Result<Quality, CovarianceError>,
+    /// Lengths that contradict the others so clearly that they were taken out of the adjustment, with their normalised residuals.
+    pub rejected: Vec<(LengthId, f64)>,
     /// Decisions that a user should know of.
     pub notes: Vec<String>,
 }
@@ -65,4 +71,7 @@ pub struct ScaleBarReport {
     pub found_m: Option<f64>,
     /// Took no part in the adjustment.
     pub check: bool,
+    /// Error of a check over its standard deviation, which is that of the given length and that of the picks together; of a length that takes
+    /// part, its normalised residual. `None` where nothing checks it.
+    pub normalised_residual: Option<f64>,
 }

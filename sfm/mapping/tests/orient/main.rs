@@ -4,6 +4,7 @@ mod determinism;
 mod edges;
 mod exact;
 mod lengths;
+mod quality;
 mod rig;
 mod single;
 mod support;
