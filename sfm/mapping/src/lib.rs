@@ -36,6 +36,6 @@ pub use input::{BaselineInput, CameraInput, ImageInput, ImagePick, MapInput, Rig
 pub use lengths::LengthId;
 pub use options::OrientOptions;
 pub use orient::orient;
-pub use readjust::readjust;
 pub use quality::{InteriorSigma, PoseSigma, Quality};
+pub use readjust::readjust;
 pub use summary::{BaselineReport, LeftOut, OrientSummary, Orientation, ScaleBarReport};

@@ -110,7 +110,9 @@ fn length_notes(input: &MapInput, lengths: &[(LengthId, Option<f64>)], rejected:
     };
     let out = rejected.iter().map(|&(id, w)| {
         let name = name(id);
-        format!("{name} contradicts the other lengths (normalised residual {w:.1}, at most {CRITICAL} by chance) and was taken out: check it")
+        format!(
+            "{name} contradicts the other lengths (normalised residual {w:.1}, at most {CRITICAL} by chance) and was taken out: check it"
+        )
     });
     let against: Vec<String> = lengths
         .iter()
@@ -285,8 +287,11 @@ fn reject_wrong_lengths<'a>(
 ) -> Result<Done<'a>, MapError> {
     let mut rejected = Vec::new();
     loop {
-        let quality =
-            if model.oriented_frames().is_empty() { Err(CovarianceError::Singular) } else { quality(&model, &lengths, scale, &adjustment, options) };
+        let quality = if model.oriented_frames().is_empty() {
+            Err(CovarianceError::Singular)
+        } else {
+            quality(&model, &lengths, scale, &adjustment, options)
+        };
         let wrong = quality.as_ref().ok().and_then(|q| wrong_length(&q.lengths));
         let Some(wrong) = wrong else { return Ok(Done { model, outcomes, adjustment, scale, quality, rejected }) };
         rejected.push(wrong);

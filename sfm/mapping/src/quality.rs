@@ -140,13 +140,7 @@ fn grouped(group: &[usize], normalised: &[f64], redundancy: &[f64]) -> Option<f6
     (sum > 0.01 * group.len() as f64).then(|| group.iter().map(|&i| normalised[i]).sum::<f64>() / sum.sqrt())
 }
 
-fn pose_sigma(
-    model: &Model,
-    image: ImageId,
-    problem: &Problem,
-    places: &ProblemMap,
-    found: &Covariance,
-) -> Option<PoseSigma> {
+fn pose_sigma(model: &Model, image: ImageId, problem: &Problem, places: &ProblemMap, found: &Covariance) -> Option<PoseSigma> {
     let (frame, sensor) = sensor_of(model, places, image)?;
     let of_frame = found.frames[frame as usize].unwrap_or_default();
     let (pose, cam_from_rig) = (problem.frames[frame as usize].pose, problem.sensors[sensor as usize].pose);

@@ -21,7 +21,8 @@ use solve::triangulate::{View, triangulate};
 /// [`MapError`] when the input contradicts itself or the start, or nothing is left.
 pub fn readjust(input: &MapInput, start: &Reconstruction, options: &OrientOptions) -> Result<Orientation, MapError> {
     input.check()?;
-    if start.images.len() != input.images.len() || start.keypoints.len() != input.images.len() || start.cameras.len() != input.cameras.len() {
+    if start.images.len() != input.images.len() || start.keypoints.len() != input.images.len() || start.cameras.len() != input.cameras.len()
+    {
         let counts = (start.images.len(), start.cameras.len(), input.images.len(), input.cameras.len());
         let (a, b, c, d) = counts;
         return Err(MapError::Inconsistent(format!("a model of {a} images by {b} cameras for an input of {c} images by {d} cameras")));

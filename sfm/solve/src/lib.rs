@@ -2,6 +2,7 @@
 
 pub mod absolute;
 pub mod adjust;
+pub mod averaging;
 pub mod lie;
 mod numeric;
 pub mod ransac;

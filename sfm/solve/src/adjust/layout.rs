@@ -279,7 +279,8 @@ impl Layout {
             }
             self.camera_free.push(free);
         }
-        self.kept_points = problem.scale_bars.iter().flat_map(|b| [b.a, b.b]).chain(problem.control_points.iter().map(|o| o.point)).collect();
+        self.kept_points =
+            problem.scale_bars.iter().flat_map(|b| [b.a, b.b]).chain(problem.control_points.iter().map(|o| o.point)).collect();
         self.kept_points.sort_unstable();
         self.kept_points.dedup();
         for i in 0..self.kept_points.len() {

@@ -221,7 +221,8 @@ pub(super) fn other_residuals(problem: &Problem, layout: &Layout) -> usize {
         Owner::Point(_) => 0,
     };
     let axes = |sigma: &Vector3<f64>| sigma.iter().filter(|s| s.is_finite()).count();
-    let instruments = problem.positions.iter().map(|o| axes(&o.sigma)).sum::<usize>() + 2 * problem.directions.len() + problem.headings.len();
+    let instruments =
+        problem.positions.iter().map(|o| axes(&o.sigma)).sum::<usize>() + 2 * problem.directions.len() + problem.headings.len();
     let control = problem.control_points.iter().map(|o| axes(&o.sigma)).sum::<usize>();
     layout.owners.iter().map(count).sum::<usize>() + instruments + control
 }

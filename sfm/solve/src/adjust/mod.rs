@@ -31,7 +31,7 @@ pub use error::AdjustError;
 pub use lm::adjust;
 pub use options::{AdjustOptions, Loss};
 pub use problem::{
-    Baseline, CameraBlock, ControlPoint, DirectionObservation, HeadingObservation, ImageObservation, ParamPrior, PointBlock, PoseBlock, PosePrior,
-    PositionObservation, Problem, ScaleBar,
+    Baseline, CameraBlock, ControlPoint, DirectionObservation, HeadingObservation, ImageObservation, ParamPrior, PointBlock, PoseBlock,
+    PosePrior, PositionObservation, Problem, ScaleBar,
 };
 pub use summary::{AdjustSummary, LengthResidual, ParameterCounts, ReprojectionErrors, Termination};

@@ -54,8 +54,11 @@ impl AdjustOptions {
             }
         }
         let scale = |loss: &Loss| loss.scale_px().unwrap_or(1.0);
-        let positive =
-            [("initial_radius", self.initial_radius), ("loss.scale_px", scale(&self.loss)), ("sensor_loss.scale_px", scale(&self.sensor_loss))];
+        let positive = [
+            ("initial_radius", self.initial_radius),
+            ("loss.scale_px", scale(&self.loss)),
+            ("sensor_loss.scale_px", scale(&self.sensor_loss)),
+        ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(AdjustError::BadOption { name, value });

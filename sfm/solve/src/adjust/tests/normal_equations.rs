@@ -122,12 +122,19 @@ pub(super) fn everything(model: CameraModel, sensors: usize) -> Problem {
     let arm = Vector3::new(0.1, -0.4, 0.2);
     problem.positions = vec![
         PositionObservation { frame: 1, in_rig: arm, xyz: at(1, arm).add_scalar(0.02), sigma: Vector3::new(0.1, 0.2, 0.05) },
-        PositionObservation { frame: 3, in_rig: Vector3::zeros(), xyz: at(3, Vector3::zeros()), sigma: Vector3::new(f64::INFINITY, f64::INFINITY, 0.02) },
+        PositionObservation {
+            frame: 3,
+            in_rig: Vector3::zeros(),
+            xyz: at(3, Vector3::zeros()),
+            sigma: Vector3::new(f64::INFINITY, f64::INFINITY, 0.02),
+        },
         PositionObservation { frame: 0, in_rig: arm, xyz: at(0, arm), sigma: Vector3::repeat(0.1) },
     ];
     let down = Vector3::new(0.1, 0.9, -0.2);
-    problem.directions = [1, 2].map(|frame| DirectionObservation { frame, in_rig: Vector3::new(0.0, 2.0, 0.1), in_world: down, sigma_rad: 0.03 }).to_vec();
-    problem.headings = [2, 3].map(|frame| HeadingObservation { frame, axis_in_rig: Vector3::z(), heading_rad: 3.0, sigma_rad: 0.1 }).to_vec();
+    problem.directions =
+        [1, 2].map(|frame| DirectionObservation { frame, in_rig: Vector3::new(0.0, 2.0, 0.1), in_world: down, sigma_rad: 0.03 }).to_vec();
+    problem.headings =
+        [2, 3].map(|frame| HeadingObservation { frame, axis_in_rig: Vector3::z(), heading_rad: 3.0, sigma_rad: 0.1 }).to_vec();
     problem.control_points = [(7, 0.01), (9, f64::INFINITY), (3, 0.1)]
         .map(|(point, sigma)| ControlPoint {
             point,
