@@ -2,9 +2,23 @@
 
 use solve::adjust::Loss;
 
+/// Which way a model is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mapper {
+    /// All at once where there are many frames and the interior orientation is known, else one by one; what fails falls back to the latter.
+    #[default]
+    Auto,
+    /// All frames at once.
+    Global,
+    /// One frame after the other.
+    Incremental,
+}
+
 /// Options of [`crate::orient`]. The defaults suit photographs of 1 to 20 megapixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrientOptions {
+    /// Which way a model is made.
+    pub mapper: Mapper,
     /// Inliers that an initial pair needs.
     pub initial_min_inliers: usize,
     /// Median intersection angle that an initial pair should have, degrees; lowered step by step when no pair has it.
@@ -42,6 +56,7 @@ impl OrientOptions {
 impl Default for OrientOptions {
     fn default() -> Self {
         Self {
+            mapper: Mapper::Auto,
             initial_min_inliers: 100,
             initial_min_angle_deg: 16.0,
             register_max_error_px: 12.0,

@@ -1,12 +1,12 @@
 //! The way from verified pairs to models.
 
-use crate::attempt::best_model;
+use crate::attempt::{Made, model_of};
 use crate::contradiction;
 use crate::error::MapError;
 use crate::frames::{Layout, given_pose, known_rig};
 use crate::graph::CorrespondenceGraph;
 use crate::incremental::{Tries, finish, settle};
-use crate::initial::{from_exposures, from_pairs};
+use crate::initial::{Starts, from_exposures, from_pairs};
 use crate::input::{MapInput, RigMode};
 use crate::interior::{best_interior, is_plausible};
 use crate::lengths::{LengthId, Lengths, report_bars, report_baselines, rescale};
@@ -79,8 +79,8 @@ pub(crate) fn orientation(input: &MapInput, done: Done, mut notes: Vec<String>, 
     let baselines = report_baselines(&done.model, done.scale);
     let scale_bars = report_bars(&done.model, done.scale, of_lengths);
     let models = vec![reconstruction(&done.model, done.scale)];
-    let Done { adjustment, quality, rejected, .. } = done;
-    Orientation { models, summary: OrientSummary { adjustment, left_out, baselines, scale_bars, quality, rejected, notes } }
+    let Done { adjustment, quality, rejected, made, .. } = done;
+    Orientation { models, summary: OrientSummary { adjustment, made, left_out, baselines, scale_bars, quality, rejected, notes } }
 }
 
 /// Finishes a model that nobody grew here.
@@ -135,6 +135,7 @@ pub(crate) struct Done<'a> {
     scale: Scale,
     quality: Result<Quality, CovarianceError>,
     rejected: Vec<(LengthId, f64)>,
+    made: Option<Made>,
 }
 
 impl Done<'_> {
@@ -187,9 +188,15 @@ fn one_by_one<'a>(
     notes: &mut Vec<String>,
 ) -> Result<Done<'a>, MapError> {
     let any = vec![true; independent.frames.len()];
-    let starts = from_pairs(independent, &any, options);
-    let none = MapError::NoInitialPair { candidates: starts.tried, best_inliers: starts.best_inliers, needed: options.initial_min_inliers };
-    let Some((mut model, tries)) = best_model(independent, &starts, &any, options)? else { return Err(none) };
+    let none = |starts: &Starts| MapError::NoInitialPair {
+        candidates: starts.tried,
+        best_inliers: starts.best_inliers,
+        needed: options.initial_min_inliers,
+    };
+    let (mut model, tries, made) = match model_of(independent, || from_pairs(independent, &any, options), &any, false, options)? {
+        Ok(found) => found,
+        Err(starts) => return Err(none(&starts)),
+    };
     let outcomes = by_image(&model, &tries);
     let mut scale = Scale::Arbitrary;
     if input.rig.mode == RigMode::Rigid && input.cameras.len() > 1 {
@@ -212,9 +219,9 @@ fn one_by_one<'a>(
             )),
         }
     }
-    let done = finish_metric(model, outcomes, scale, options)?;
+    let done = Done { made: Some(made), ..finish_metric(model, outcomes, scale, options)? };
     // What grew from a wrong start may fall to nothing.
-    if done.model.oriented_frames().is_empty() { Err(none) } else { Ok(done) }
+    if done.is_empty() { Err(none(&from_pairs(independent, &any, options))) } else { Ok(done) }
 }
 
 /// A model of the images that are not taken, one pose an exposure, in the unit of the rig; `None` when no exposure has
@@ -229,11 +236,10 @@ fn on_rig<'a>(
     let layout = Layout::rigid(input, cam_from_rig);
     let empty = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
     let allowed: Vec<bool> = empty.frame_images.iter().map(|images| images.iter().all(|i| !taken[i.index()])).collect();
-    let Some((model, tries)) = best_model(&empty, &from_exposures(&empty, &allowed, &options.growing()), &allowed, options)? else {
-        return Ok(None);
-    };
+    let starts = || from_exposures(&empty, &allowed, &options.growing());
+    let Ok((model, tries, made)) = model_of(&empty, starts, &allowed, true, options)? else { return Ok(None) };
     let outcomes = by_image(&model, &tries);
-    let done = finish_with_lengths(model, outcomes, scale, options)?;
+    let done = Done { made: Some(made), ..finish_with_lengths(model, outcomes, scale, options)? };
     Ok((!done.model.oriented_frames().is_empty()).then_some(done))
 }
 
@@ -293,7 +299,7 @@ fn reject_wrong_lengths<'a>(
             quality(&model, &lengths, scale, &adjustment, options)
         };
         let wrong = quality.as_ref().ok().and_then(|q| wrong_length(&q.lengths));
-        let Some(wrong) = wrong else { return Ok(Done { model, outcomes, adjustment, scale, quality, rejected }) };
+        let Some(wrong) = wrong else { return Ok(Done { model, outcomes, adjustment, scale, quality, rejected, made: None }) };
         rejected.push(wrong);
         lengths = lengths.without(wrong.0);
         adjustment = settle(&mut model, Some(&lengths), options)?;
@@ -331,8 +337,8 @@ fn further_model<'a>(
     }
     let layout = Layout::independent(input);
     let empty = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
-    let starts = from_pairs(&empty, &allowed, options);
-    let Some((model, tries)) = best_model(&empty, &starts, &allowed, options)? else { return Ok(None) };
+    let starts = || from_pairs(&empty, &allowed, options);
+    let Ok((model, tries, _)) = model_of(&empty, starts, &allowed, false, options)? else { return Ok(None) };
     let outcomes = by_image(&model, &tries);
     Ok(Some(finish_metric(model, outcomes, Scale::Arbitrary, options)?).filter(enough))
 }

@@ -1,5 +1,6 @@
 //! What came out of an orientation.
 
+use crate::attempt::Made;
 use crate::lengths::LengthId;
 use crate::quality::Quality;
 use scene::{CameraId, ImageId, Reconstruction};
@@ -19,6 +20,8 @@ pub struct Orientation {
 pub struct OrientSummary {
     /// The last adjustment of the first model.
     pub adjustment: AdjustSummary,
+    /// How the first model was made; `None` of one that was only adjusted.
+    pub made: Option<Made>,
     /// Images in no model, and why.
     pub left_out: Vec<LeftOut>,
     /// Known baselines and what was found; empty where the first model is not metric.
