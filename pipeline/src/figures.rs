@@ -34,7 +34,10 @@ pub fn report(config: &Config, done: &BTreeMap<&'static str, Stamp>) -> Value {
         "reprojection_mean_px": figure("orient", "reprojection_mean_px"),
         "scale": figure("orient", "scale"),
         "models": figure("orient", "models"),
+        "mapper": figure("orient", "mapper"),
         "adjustment": figure("orient", "adjustment"),
+        "precision": figure("orient", "precision"),
+        "length_error": figure("orient", "length_error"),
         "baselines": figure("orient", "baselines"),
         "scale_bars": figure("orient", "scale_bars"),
         "dense": part("densify", &dense),
@@ -48,7 +51,7 @@ fn cameras(ingested: Value, oriented: &Value) -> Value {
     let Value::Array(mut cameras) = ingested else { return Value::Null };
     for (i, camera) in cameras.iter_mut().enumerate() {
         if let Value::Object(camera) = camera {
-            for key in ["model", "start", "params"] {
+            for key in ["model", "start", "params", "sigmas", "correlations", "residuals"] {
                 camera.insert(key.to_owned(), oriented[i][key].clone());
             }
         }

@@ -84,6 +84,7 @@ pub const KEYS: &[(&str, &str)] = &[
     ("matching.min_correlation", "a number from 0 to 1"),
     ("matching.max_error_px", "a number above 0, pixels"),
     ("matching.min_inliers", "a whole number"),
+    ("orient.mapper", "\"auto\", \"global\" or \"incremental\""),
     ("orient.initial_min_inliers", "a whole number"),
     ("orient.initial_min_angle_deg", "a number, degrees"),
     ("orient.register_max_error_px", "a number above 0, pixels"),

@@ -154,6 +154,7 @@ pub(super) struct RawMatching {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawOrient {
+    pub(super) mapper: Place<String>,
     pub(super) initial_min_inliers: Place<u32>,
     pub(super) initial_min_angle_deg: Place<f64>,
     pub(super) register_max_error_px: Place<f64>,

@@ -131,9 +131,23 @@ pub struct MatchingConfig {
     pub min_inliers: u32,
 }
 
+/// Which way a model is made, see `mapping::Mapper`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mapper {
+    /// The program chooses.
+    Auto,
+    /// All frames at once.
+    Global,
+    /// One frame after the other.
+    Incremental,
+}
+
 /// Options of the stage `orient`, see `mapping::OrientOptions`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OrientConfig {
+    /// Which way a model is made.
+    pub mapper: Mapper,
     /// Inliers that the first pair needs.
     pub initial_min_inliers: u32,
     /// Intersection angle that the first pair should have, degrees.

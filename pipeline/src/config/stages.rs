@@ -6,7 +6,7 @@ use super::path_text::PathText;
 use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport};
 use super::stage_options::{
     DenseQuality, DensifyConfig, EvaluateConfig, FeatureMethod, FeaturesConfig, IpConfig, MaskConfig, MaskStrategy, MatchingConfig,
-    OrientConfig, PairRule, Polarity, ReportConfig,
+    Mapper, OrientConfig, PairRule, Polarity, ReportConfig,
 };
 use super::values::Values;
 use std::path::Path;
@@ -104,8 +104,11 @@ pub(super) fn orient(source: &mut Source<'_>, raw: &RawOrient) -> OrientConfig {
     let mut count = |key: &str, value, low, default: usize| values.count(key, value, low, 100_000, default as u32);
     let initial_min_inliers = count("orient.initial_min_inliers", &raw.initial_min_inliers, 10, default.initial_min_inliers);
     let register_min_inliers = count("orient.register_min_inliers", &raw.register_min_inliers, 6, default.register_min_inliers);
+    let mappers = [("auto", Mapper::Auto), ("global", Mapper::Global), ("incremental", Mapper::Incremental)];
+    let mapper = values.choice("orient.mapper", &raw.mapper, &mappers).unwrap_or(Mapper::Auto);
     let mut within = |key: &str, value, low, high, default| values.within(key, value, low, high, default);
     OrientConfig {
+        mapper,
         initial_min_inliers,
         initial_min_angle_deg: within("orient.initial_min_angle_deg", &raw.initial_min_angle_deg, 0.1, 90.0, default.initial_min_angle_deg),
         register_max_error_px: within(

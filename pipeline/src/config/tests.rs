@@ -160,6 +160,7 @@ fn defaults() {
     assert_eq!((config.features.max_keypoints, config.features.double_up_to_mpx), (8192, 2.1));
     // As docs/dive-toml.md states them; they come from the packages.
     assert_eq!((config.matching.ratio, config.matching.max_error_px, config.matching.min_inliers), (0.8, 4.0, 15));
+    assert_eq!(config.orient.mapper, Mapper::Auto);
     assert_eq!((config.orient.initial_min_inliers, config.orient.initial_min_angle_deg, config.orient.min_angle_deg), (100, 16.0, 1.5));
     assert_eq!((config.orient.register_max_error_px, config.orient.register_min_inliers, config.orient.max_error_px), (12.0, 30, 2.0));
     assert_eq!((config.densify.max_views, config.densify.min_views), (5, 3));

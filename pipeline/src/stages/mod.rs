@@ -11,6 +11,7 @@ pub mod mask;
 pub mod matching;
 pub mod model;
 pub mod orient;
+mod orient_figures;
 mod page;
 mod pairing;
 pub mod report;

@@ -73,11 +73,11 @@ fn without_shear(model: &Reconstruction) -> Option<Reconstruction> {
 
 type Writer = fn(&ColmapModel<'_>, &mut dyn Write) -> std::io::Result<()>;
 
-/// Writes a model and its points as a cloud below a folder. The shear of a camera of Brown's model is left out: COLMAP's models have none.
+/// Writes a model and its points as a cloud below a folder; `sigmas` of the points, or none. The shear of a camera of Brown's model is left out: COLMAP's models have none.
 ///
 /// # Errors
 /// When COLMAP cannot hold the model, or a file cannot be written.
-pub fn save(work: &Work<'_>, model: &Reconstruction, folder: &str) -> Result<()> {
+pub fn save(work: &Work<'_>, model: &Reconstruction, sigmas: &[Option<f64>], folder: &str) -> Result<()> {
     let sheared = without_shear(model);
     let colmap = ColmapModel::new(sheared.as_ref().unwrap_or(model))?;
     let writers: [Writer; 5] = [
@@ -95,6 +95,7 @@ pub fn save(work: &Work<'_>, model: &Reconstruction, folder: &str) -> Result<()>
     let cloud = Cloud {
         positions: model.points.iter().map(|p| p.xyz.into()).collect(),
         colours: model.points.iter().map(|p| p.colour).collect(),
+        sigmas: sigmas.iter().map(|s| s.map_or(f32::NAN, |s| s as f32)).collect(),
         views: model.points.iter().map(|p| p.track.len().min(usize::from(u16::MAX)) as u16).collect(),
         ..Cloud::default()
     };

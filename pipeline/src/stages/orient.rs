@@ -2,23 +2,23 @@
 
 use super::images::{ImageEntry, ImageList};
 use super::interior::{self, Start};
+use super::orient_figures::{figures, precision_table};
 use super::{features, matching, model};
-use crate::config::{Config, RigMode, ScaleBarConfig};
+use crate::config::{Config, Mapper, RigMode, ScaleBarConfig};
 use crate::error::NoResult;
 use crate::stage::{Outcome, Stage, Work, no_inputs};
-use crate::store::Warning;
+use crate::store::{Fingerprint, Warning};
 use anyhow::{Context, Result};
 use mapping::{
-    BaselineInput, CameraInput, ImageInput, ImagePick, MapError, MapInput, OrientOptions, Orientation, RigInput, RigPoseInput,
-    ScaleBarInput,
+    BaselineInput, CameraInput, ImageInput, ImagePick, MapError, MapInput, OrientOptions, RigInput, RigPoseInput, ScaleBarInput,
 };
 use rayon::prelude::*;
-use scene::{CameraId, ImageId, Keypoint, Reconstruction, Scale};
+use scene::{CameraId, ImageId, Keypoint};
 use serde_json::{Value, json};
 
 /// The stage.
 pub const STAGE: Stage =
-    Stage { name: "orient", version: 2, upstream: &["ingest", "features", "matching"], options, inputs: no_inputs, work };
+    Stage { name: "orient", version: 3, upstream: &["ingest", "features", "matching"], options, inputs: no_inputs, work };
 
 /// Standard deviation of a keypoint's position over its scale: what was found in a coarser image is as much less precise (Zeisl, Georgel,
 /// Schweiger, Steinbach & Navab, *Estimation of location uncertainty for scale invariant feature points*, BMVC 2009). The finest
@@ -66,9 +66,14 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
     };
     let largest = orientation.models.first().context("the orientation has no model")?;
     model::save_calibrations(work, largest, &list)?;
-    model::save(work, largest, "sparse")?;
+    let quality = orientation.summary.quality.as_ref().ok();
+    model::save(work, largest, quality.map_or(&[], |q| &q.points), "sparse")?;
+    if let Some(quality) = quality {
+        let table = precision_table(largest, quality);
+        work.files.save("sparse/precision.csv", Fingerprint::of_bytes(table.as_bytes()), table.as_bytes())?;
+    }
     for (i, model) in orientation.models.iter().enumerate().skip(1) {
-        model::save(work, model, &format!("sparse/{i}"))?;
+        model::save(work, model, &[], &format!("sparse/{i}"))?;
     }
     warnings.extend(orientation.summary.notes.iter().map(|note| Warning { about: "orientation".to_owned(), message: note.clone() }));
     // Why an image has no keypoints has been told by the stage that found none.
@@ -87,6 +92,11 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
 fn options_of(config: &Config) -> OrientOptions {
     let o = &config.orient;
     OrientOptions {
+        mapper: match o.mapper {
+            Mapper::Auto => mapping::Mapper::Auto,
+            Mapper::Global => mapping::Mapper::Global,
+            Mapper::Incremental => mapping::Mapper::Incremental,
+        },
         initial_min_inliers: o.initial_min_inliers as usize,
         initial_min_angle_deg: o.initial_min_angle_deg,
         register_max_error_px: o.register_max_error_px,
@@ -167,58 +177,4 @@ fn scale_bar(bar: &ScaleBarConfig, list: &ImageList, warnings: &mut Vec<Warning>
         found
     });
     ScaleBarInput { ends, length_m: bar.length_m, sigma_m: bar.sigma_m, check: bar.check }
-}
-
-fn figures(config: &Config, list: &ImageList, starts: &[Start], orientation: &Orientation, model: &Reconstruction) -> Value {
-    let summary = &orientation.summary;
-    let oriented = model.oriented_images().count();
-    let scale = match model.scale {
-        Scale::Metric => "metric",
-        Scale::Arbitrary => "arbitrary",
-    };
-    let cameras: Vec<Value> = model
-        .cameras
-        .iter()
-        .zip(starts)
-        .zip(&list.cameras)
-        .map(|((camera, start), entry)| {
-            let params: serde_json::Map<String, Value> =
-                camera.model().param_names().iter().zip(camera.params()).map(|(name, value)| ((*name).to_owned(), json!(value))).collect();
-            json!({"name": entry.name, "model": camera.model().name(), "start": start.origin, "params": params})
-        })
-        .collect();
-    let name = |camera: CameraId| list.cameras[camera.index()].name.clone();
-    let baselines: Vec<Value> = summary
-        .baselines
-        .iter()
-        .map(|b| {
-            json!({
-                "between": [name(b.cameras.0), name(b.cameras.1)], "given_m": b.given_m, "found_m": b.found_m, "sigma_m": b.sigma_m,
-                "normalised_residual": b.normalised_residual,
-            })
-        })
-        .collect();
-    let scale_bars: Vec<Value> = summary
-        .scale_bars
-        .iter()
-        .map(|b| {
-            json!({
-                "name": config.scale_bars[b.index].name, "given_m": b.given_m, "found_m": b.found_m,
-                "error_m": b.found_m.map(|found| found - b.given_m), "check": b.check,
-            })
-        })
-        .collect();
-    let models: Vec<Value> =
-        orientation.models.iter().map(|m| json!({"images": m.oriented_images().count(), "points": m.points.len()})).collect();
-    let rms = model.reprojection_rms();
-    let note = format!("{oriented} of {} images, {} points, {rms:.2} px, {scale}", list.images.len(), model.points.len());
-    json!({
-        "oriented": oriented, "points": model.points.len(), "observations": model.observation_count(), "reprojection_rms_px": rms,
-        "reprojection_mean_px": model.mean_point_error(), "scale": scale, "cameras": cameras, "baselines": baselines,
-        "scale_bars": scale_bars, "models": models, "note": note,
-        "adjustment": {
-            "initial_cost": summary.adjustment.initial_cost, "final_cost": summary.adjustment.final_cost,
-            "iterations": summary.adjustment.iterations, "termination": format!("{:?}", summary.adjustment.termination).to_lowercase(),
-        },
-    })
 }

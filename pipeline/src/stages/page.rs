@@ -87,11 +87,11 @@ fn sections(figures: &Value) -> Vec<Section> {
     });
     let baselines = rows(&figures["baselines"], |b| {
         let between = format!("{} to {}", text(&b["between"][0]), text(&b["between"][1]));
-        vec![between, number(&b["given_m"], 4), number(&b["found_m"], 4), number(&b["sigma_m"], 4), number(&b["normalised_residual"], 2)]
+        vec![between, number(&b["given_m"], 4), number(&b["found_m"], 4), number(&b["sigma_m"], 4), number(&b["test_value"], 1), role(b)]
     });
     let bars = rows(&figures["scale_bars"], |b| {
-        let role = if b["check"] == true { "held out" } else { "used" };
-        vec![text(&b["name"]), number(&b["given_m"], 4), number(&b["found_m"], 4), number(&b["error_m"], 5), role.to_owned()]
+        let (given, found) = (number(&b["given_m"], 4), number(&b["found_m"], 4));
+        vec![text(&b["name"]), given, found, number(&b["error_m"], 5), number(&b["normalised_residual"], 1), role(b)]
     });
     let models = rows(&figures["models"], |m| vec![text(&m["images"]), text(&m["points"])]);
     let matching = &figures["matching"];
@@ -102,14 +102,40 @@ fn sections(figures: &Value) -> Vec<Section> {
         text(&matching["uncalibrated"]),
         text(&matching["planar_or_panoramic"]),
     ]];
+    let normalised = "A normalised residual is above 3.3 once in 1,000 times by chance.";
+    let unit = if figures["scale"] == "metric" { "m" } else { "units of the model" };
+    let p = &figures["precision"];
+    let datum = format!(
+        "Standard deviations relative to {}. Image observations are {} times as uncertain as assumed, and weighed so.",
+        text(&p["datum"]),
+        number(&p["sigma0_image"], 2)
+    );
+    let precision = [
+        (format!("projection centres, {unit}"), "centre_median", "centre_max", 5),
+        ("rotations, degrees".to_owned(), "rotation_median_deg", "rotation_max_deg", 4),
+        (format!("points, {unit}"), "point_median", "", 5),
+    ];
+    let precision = precision.into_iter().map(|(of, median, max, d)| vec![of, number(&p[median], d), number(&p[max], d)]);
+    let precision: Vec<_> = precision.filter(|row| !row[1].is_empty()).collect();
     let sections = [
         section("Cameras", "Lengths in pixels.", &["camera", "images", "model", "interior orientation", "start"], cameras),
-        section("Baselines", "", &["between", "given, m", "found, m", "sigma, m", "residual / sigma"], baselines),
-        section("Known lengths", "", &["length", "given, m", "found, m", "error, m", "role"], bars),
+        section("Baselines", normalised, &["between", "given, m", "found, m", "sigma, m", "normalised residual", "role"], baselines),
+        section("Known lengths", normalised, &["length", "given, m", "found, m", "error, m", "normalised residual", "role"], bars),
+        section("Precision", &datum, &["of", "median", "largest"], precision),
         section("Pairs of images", "", &["tried", "verified", "calibrated", "uncalibrated", "planar or panoramic"], pairs),
     ];
     let fell_apart = (models.len() > 1).then(|| section("Models", "The images fell apart.", &["images", "points"], models));
     sections.into_iter().chain(fell_apart).filter(|s| !s.rows.is_empty()).collect()
+}
+
+/// What a known length is there for.
+fn role(length: &Value) -> String {
+    match () {
+        () if length["rejected"] == true => "taken out",
+        () if length["check"] == true => "held out",
+        () => "used",
+    }
+    .to_owned()
 }
 
 fn text(value: &Value) -> String {

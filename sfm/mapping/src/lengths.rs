@@ -214,10 +214,12 @@ pub(crate) fn report_baselines(model: &Model, scale: Scale) -> Vec<BaselineRepor
     let rig = &model.input.rig;
     rig.baselines
         .iter()
-        .filter_map(|b| {
+        .enumerate()
+        .filter_map(|(index, b)| {
             let found: Vec<f64> = simultaneous(model, b.cameras).into_iter().filter_map(|images| distance(model, images)).collect();
             let n = found.len() as f64;
             (!found.is_empty()).then(|| BaselineReport {
+                index,
                 cameras: b.cameras,
                 given_m: b.length_m,
                 found_m: found.iter().sum::<f64>() / n,

@@ -48,6 +48,8 @@ pub struct LeftOut {
 /// A known baseline and what was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaselineReport {
+    /// Position in the input.
+    pub index: usize,
     /// The cameras.
     pub cameras: (CameraId, CameraId),
     /// Given length, metres.

@@ -120,3 +120,29 @@ fn somebody_elses_model_gets_metres() {
     let d = synthetic::deviation(&out.models[0], &made.truth, Alignment::Se3).expect("all oriented");
     assert!((d.scale - 1.0).abs() < 0.003, "{d:?}");
 }
+
+#[test]
+fn residuals_tell_where_a_camera_model_is_wrong() {
+    let (made, _) = triplet(RigMode::Rigid);
+    let mut model = made.truth;
+    let right = mapping::camera_residuals(&model);
+    assert_eq!((right.len(), right[0].regions.len()), (3, 16));
+    let count: usize = right.iter().map(|c| c.all.observations).sum();
+    assert_eq!(count, model.observation_count());
+    // Noise along two axes.
+    let mut squares = 0.0;
+    for c in &right {
+        assert!((c.all.rms_px / (NOISE_PX * 2f64.sqrt()) - 1.0).abs() < 0.05 && c.all.mean_px.iter().all(|m| m.abs() < 0.05), "{:?}", c.all);
+        assert_eq!(c.regions.iter().map(|r| r.observations).sum::<usize>(), c.all.observations);
+        squares += c.regions.iter().map(|r| r.observations as f64 * r.rms_px * r.rms_px).sum::<f64>();
+    }
+    let rms = (squares / count as f64).sqrt();
+    assert!((rms - model.reprojection_rms()).abs() < 1e-9, "{rms} {}", model.reprojection_rms());
+    // A principal distance 1 % too long pushes everything outward, and the principal point 2 px aside everything there.
+    model.cameras[1].params_mut()[0] *= 1.01;
+    model.cameras[1].params_mut()[1] += 2.0;
+    let wrong = mapping::camera_residuals(&model);
+    assert_eq!(wrong[0], right[0]);
+    let (left, right) = (wrong[1].regions[4].mean_px[0], wrong[1].regions[7].mean_px[0]);
+    assert!(left < 0.0 && right > 4.0 && (wrong[1].all.mean_px[0] - 2.0).abs() < 1.0, "{left} {right} {:?}", wrong[1].all);
+}
