@@ -221,3 +221,32 @@ fn variables_are_paths_and_calibrations_must_fit() {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(stderr.contains("ingest") && stderr.contains("another aspect") && !stderr.contains("features"), "{stderr}");
 }
+
+/// Two images of four points: what comes out must project where they were seen.
+#[test]
+fn bundle_adjusts_a_problem_and_refuses_a_broken_one() {
+    let dive = Dive::of_noise();
+    let points = [[0.0, 0.0, 0.0], [1.0, 0.2, -0.5], [-0.8, 0.7, 0.3], [0.4, -0.9, 0.6], [-0.5, -0.4, -0.7], [0.9, 0.8, 0.1]];
+    let shifts = [0.0, 0.6];
+    let mut text = format!("2 {} {}\n", points.len(), 2 * points.len());
+    for (i, p) in points.iter().enumerate() {
+        for (c, shift) in shifts.iter().enumerate() {
+            // P = X + t with t = (shift, 0, -5), p = -f P / P.z.
+            let z: f64 = p[2] - 5.0;
+            text += &format!("{c} {i} {} {}\n", -500.0 * (p[0] + shift) / z, -500.0 * p[1] / z);
+        }
+    }
+    for shift in shifts {
+        text += &format!("0\n0\n0.01\n{shift}\n0\n-5\n510\n0\n0\n");
+    }
+    points.iter().flatten().for_each(|x| text += &format!("{}\n", x + 0.01));
+    dive.write("problem.txt", &text);
+    let out: serde_json::Value = serde_json::from_str(&dive.ok(&["bundle", "problem.txt", "--json"])).unwrap();
+    let cost = |key: &str| out[key].as_f64().unwrap();
+    assert!(cost("initial_cost") > 10.0 && cost("final_cost") < 1e-3 && cost("seconds") >= 0.0, "{out}");
+    assert_eq!(out["observations"], 12);
+    dive.write("cut.txt", &text[..200]);
+    let (code, message) = dive.fails(&["bundle", "cut.txt"]);
+    assert!(code == 1 && message.contains("cut.txt: the file ends where"), "{message}");
+    assert!(dive.fails(&["bundle", "frames"]).1.contains("cameras.bin"));
+}

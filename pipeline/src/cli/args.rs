@@ -34,6 +34,8 @@ pub enum Command {
     Synth(SynthArgs),
     /// Measure a cloud against a reference in the same frame.
     Eval(EvalArgs),
+    /// Adjust a bundle problem as it is: a file of "Bundle Adjustment in the Large" or a COLMAP model.
+    Bundle(BundleArgs),
     /// Explain a command; `sfm help json` explains the keys of report.json.
     Help(HelpArgs),
 }
@@ -187,6 +189,22 @@ pub struct EvalArgs {
     /// Cell of the integrity [default: the threshold].
     #[arg(long, value_name = "METRES")]
     pub grid_m: Option<f64>,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sfm bundle`.
+#[derive(Debug, Args)]
+pub struct BundleArgs {
+    /// A text file of Bundle Adjustment in the Large, or the folder of a binary COLMAP model.
+    pub problem: PathBuf,
+    /// Largest number of steps.
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub iterations: u32,
     /// Number of threads; the results are the same with any [default: one a processor].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,

@@ -1,6 +1,7 @@
 //! The command line: parses, calls, prints. Data go to stdout, all else to stderr.
 
 mod args;
+mod bundle;
 mod dispatch;
 mod eval;
 mod help;

@@ -5,8 +5,8 @@ use super::model::CameraConfig;
 use super::path_text::PathText;
 use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport};
 use super::stage_options::{
-    DenseQuality, DensifyConfig, EvaluateConfig, FeatureMethod, FeaturesConfig, IpConfig, MaskConfig, MaskStrategy, MatchingConfig,
-    Mapper, OrientConfig, PairRule, Polarity, ReportConfig,
+    DenseQuality, DensifyConfig, EvaluateConfig, FeatureMethod, FeaturesConfig, IpConfig, Mapper, MaskConfig, MaskStrategy, MatchingConfig,
+    OrientConfig, PairRule, Polarity, ReportConfig,
 };
 use super::values::Values;
 use std::path::Path;

@@ -42,11 +42,7 @@ impl Sums {
 
     fn statistics(&self) -> RegionResiduals {
         let n = self.count.max(1.0);
-        RegionResiduals {
-            observations: self.count as usize,
-            rms_px: (self.squares / n).sqrt(),
-            mean_px: self.sum.map(|s| s / n),
-        }
+        RegionResiduals { observations: self.count as usize, rms_px: (self.squares / n).sqrt(), mean_px: self.sum.map(|s| s / n) }
     }
 }
 

@@ -1,16 +1,14 @@
 //! Adjusts a problem in the format of *Bundle Adjustment in the Large*: `bal FILE [REPEATS]`, FILE unpacked.
 
-#[path = "../tests/bal/format.rs"]
-mod format;
-
 use solve::adjust::{AdjustOptions, adjust};
+use solve::bal::parse_bal;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let file = arguments.next().ok_or("usage: bal FILE [REPEATS]")?;
     let repeats: usize = arguments.next().map_or(Ok(1), |n| n.parse())?;
-    let problem = format::parse(&std::fs::read_to_string(file)?).ok_or("not a BAL file")?;
+    let problem = parse_bal(&std::fs::read_to_string(file)?)?;
     for _ in 0..repeats {
         let mut copy = problem.clone();
         let start = Instant::now();

@@ -3,6 +3,7 @@
 pub mod absolute;
 pub mod adjust;
 pub mod averaging;
+pub mod bal;
 pub mod lie;
 mod numeric;
 pub mod ransac;

@@ -23,7 +23,8 @@ fn assert_same(input: &MapInput, alignment: Alignment, share: f64) {
     assert_eq!(a.oriented_images().count(), b.oriented_images().count());
     assert_eq!(a.scale, b.scale);
     let d = synthetic::deviation(a, b, alignment).expect("all oriented");
-    let sigma = incremental.summary.quality.as_ref().expect("determined").images.iter().flatten().flat_map(|s| s.centre).fold(0.0, f64::max);
+    let sigma =
+        incremental.summary.quality.as_ref().expect("determined").images.iter().flatten().flat_map(|s| s.centre).fold(0.0, f64::max);
     println!("{} images: {:?} of {sigma}, {} and {} points", a.oriented_images().count(), d.max_centre, a.points.len(), b.points.len());
     assert!(d.max_centre.0 < share * sigma, "{d:?}, sigma {sigma}");
     assert!((a.points.len() as f64 / b.points.len() as f64 - 1.0).abs() < 0.02);

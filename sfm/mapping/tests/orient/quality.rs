@@ -132,7 +132,11 @@ fn residuals_tell_where_a_camera_model_is_wrong() {
     // Noise along two axes.
     let mut squares = 0.0;
     for c in &right {
-        assert!((c.all.rms_px / (NOISE_PX * 2f64.sqrt()) - 1.0).abs() < 0.05 && c.all.mean_px.iter().all(|m| m.abs() < 0.05), "{:?}", c.all);
+        assert!(
+            (c.all.rms_px / (NOISE_PX * 2f64.sqrt()) - 1.0).abs() < 0.05 && c.all.mean_px.iter().all(|m| m.abs() < 0.05),
+            "{:?}",
+            c.all
+        );
         assert_eq!(c.regions.iter().map(|r| r.observations).sum::<usize>(), c.all.observations);
         squares += c.regions.iter().map(|r| r.observations as f64 * r.rms_px * r.rms_px).sum::<f64>();
     }

@@ -2,9 +2,8 @@
 //!
 //! Reads `$SFM_DATA/bal/problem-*.txt.bz2`, unpacked by `bunzip2` or Python, whichever there is.
 
-mod format;
-
 use solve::adjust::{AdjustOptions, adjust};
+use solve::bal::parse_bal;
 use std::path::Path;
 use std::process::Command;
 
@@ -26,7 +25,7 @@ fn check(file: &str, left_out: usize, ceres_cost: f64) {
         eprintln!("skipped: cannot unpack {}", path.display());
         return;
     };
-    let mut problem = format::parse(&text).expect("a BAL problem");
+    let mut problem = parse_bal(&text).expect("a BAL problem");
     let summary = adjust(&mut problem, &AdjustOptions::default()).expect("a valid problem");
     eprintln!("{file}: {summary:#?}");
     assert_eq!(summary.observations_left_out, left_out);
