@@ -39,6 +39,8 @@ impl ViewGraph {
         let all: Vec<Option<Edge>> =
             model.input.pairs.par_iter().enumerate().map(|(i, pair)| relative_rotation(model, i, pair, allowed)).collect();
         let mut edges: Vec<Edge> = all.into_iter().flatten().collect();
+        // Sums run in an order that does not depend on that of the pairs.
+        edges.sort_by_key(|e| model.input.pairs[e.pair].images);
         let (mut frames, mut rotations) = (Vec::new(), Vec::new());
         for _ in 0..ROUNDS {
             let largest = components(model.frames.len(), edges.iter().map(|e| e.frames)).swap_remove(0);

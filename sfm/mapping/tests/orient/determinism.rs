@@ -1,15 +1,17 @@
 //! The same input gives the same bits.
 
 use crate::support::{baseline, input, made, noisy, rig_poses, scale_bar};
-use mapping::{MapInput, OrientOptions, RigMode, orient};
+use mapping::{MapInput, Mapper, OrientOptions, RigMode, orient};
 use nalgebra::Vector3;
 use synthetic::Random;
 use synthetic::survey::{SurveyOptions, survey};
 
 /// Everything that comes out, to the last bit: floats print so that they read back the same, and -0 differs from 0.
-fn bits(input: &MapInput) -> String {
-    format!("{:?}", orient(input, &OrientOptions::default()).expect("a sound survey"))
+fn bits(input: &MapInput, mapper: Mapper) -> String {
+    format!("{:?}", orient(input, &OrientOptions { mapper, ..OrientOptions::default() }).expect("a sound survey"))
 }
+
+const MAPPERS: [Mapper; 2] = [Mapper::Incremental, Mapper::Global];
 
 /// One of each kind: a camera of guessed interior, a known rig, a rig to be solved, and baselines with a bar.
 fn inputs() -> Vec<MapInput> {
@@ -34,8 +36,11 @@ fn inputs() -> Vec<MapInput> {
 #[test]
 fn the_number_of_threads_does_not_matter() {
     for (i, input) in inputs().iter().enumerate() {
-        let with = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool").install(|| bits(input));
-        assert!(with(1) == with(2), "input {i}");
+        for mapper in MAPPERS {
+            let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            let with = |threads| pool(threads).install(|| bits(input, mapper));
+            assert!(with(1) == with(2), "input {i}, {mapper:?}");
+        }
     }
 }
 
@@ -47,6 +52,9 @@ fn the_order_of_pairs_does_not_matter() {
         for place in (1..shuffled.pairs.len()).rev() {
             shuffled.pairs.swap(place, random.index(place + 1));
         }
-        assert!(shuffled.pairs != input.pairs && bits(&shuffled) == bits(&input), "input {i}");
+        assert!(shuffled.pairs != input.pairs);
+        for mapper in MAPPERS {
+            assert!(bits(&shuffled, mapper) == bits(&input, mapper), "input {i}, {mapper:?}");
+        }
     }
 }

@@ -41,23 +41,27 @@ pub(super) fn layout_order(problem: &Problem, layout: &Layout) -> Vec<Unknown> {
 }
 
 fn iterate(problem: &Problem, make_pattern: impl Fn(&Layout, &KeptNormal) -> Pattern) -> (Vec<Unknown>, Iteration) {
+    iterate_on(problem, make_pattern, false)
+}
+
+fn iterate_on(problem: &Problem, make_pattern: impl Fn(&Layout, &KeptNormal) -> Pattern, parallel: bool) -> (Vec<Unknown>, Iteration) {
     let loss = Loss::Trivial;
     let mut state = State::new(problem);
     let layout = Layout::new(problem, &mut state);
     state.load_points(problem, &layout);
     let mut linear = Linearised::new(&layout);
     let mut kept = KeptNormal::new(problem, &layout, &state, &loss, loss);
-    let cost = linear.update(&layout, &state, &loss, false) + kept.update(problem, &layout, &state, &loss);
+    let cost = linear.update(&layout, &state, &loss, parallel) + kept.update(problem, &layout, &state, &loss);
     let mut reduced = Reduced::with_pattern(&layout, make_pattern(&layout, &kept), 2);
     let mut solver = Solver::new(&layout, &reduced.pattern).expect("memory");
     if let Solver::Conjugate(conjugate) = &mut solver {
         conjugate.solve_exactly();
     }
-    reduced.build(&layout, &linear, &kept, RADIUS, false);
-    assert!(solver.solve(&System { layout: &layout, linear: &linear, kept: &kept, parallel: false }, &mut reduced));
+    reduced.build(&layout, &linear, &kept, RADIUS, parallel);
+    assert!(solver.solve(&System { layout: &layout, linear: &linear, kept: &kept, parallel }, &mut reduced));
     let mut after = state.clone();
     assert!(after.set_moved(&state, &reduced.rhs, &layout));
-    let sums = Stepper::new(&layout).linear().step(&layout, &linear, &reduced, RADIUS, &loss, &state, &mut after, false);
+    let sums = Stepper::new(&layout).linear().step(&layout, &linear, &reduced, RADIUS, &loss, &state, &mut after, parallel);
     let (mut step, mut gradient) = (reduced.rhs.clone(), reduced.gradient.clone());
     for (s, slot) in layout.slots[..layout.slot_count()].iter().enumerate().filter(|(_, s)| s.free) {
         step.extend((0..3).map(|k| after.points[s][k] - state.points[s][k]));
@@ -222,4 +226,18 @@ fn vector_width_and_grouping_change_no_bit() {
         let reference = build(1, true);
         assert!(reference == build(1, false) && reference == build(2, true) && reference == build(5, false));
     }
+}
+
+#[test]
+fn conjugate_gradients_give_the_same_bits_on_any_number_of_threads() {
+    // Points of several pieces of work.
+    let mut problem = truth(&Options { frames: 12, sensors: 2, points: 700, track: 4, noise_px: 0.5, ..Options::default() });
+    problem.cameras.iter_mut().for_each(free_camera);
+    perturb(&mut problem, 0.01, 3);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let (_, iteration) = pool.install(|| iterate_on(&problem, |layout, _| Pattern::clustered(layout, 18), threads > 1));
+        iteration.step.iter().map(|x| x.to_bits()).collect::<Vec<_>>()
+    };
+    assert!(on(1) == on(2));
 }
