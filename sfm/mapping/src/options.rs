@@ -29,7 +29,8 @@ pub struct OrientOptions {
     pub register_min_inliers: usize,
     /// Share of inliers that a new frame needs.
     pub register_min_inlier_share: f64,
-    /// Largest reprojection error of an observation that is kept, pixels, and twice as much while the model grows; of a keypoint with a standard deviation below a pixel, this many
+    /// Largest reprojection error of an observation that is kept, pixels, and twice as much while the model grows; of a keypoint with a
+    /// standard deviation below a pixel, this many
     /// standard deviations.
     pub max_error_px: f64,
     /// Smallest intersection angle of a point that is kept, degrees.

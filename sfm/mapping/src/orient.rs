@@ -22,7 +22,8 @@ use solve::adjust::{AdjustSummary, CovarianceError};
 /// Models beyond the first that are tried.
 const MAX_FURTHER_MODELS: usize = 4;
 
-/// A length is wrong, and not another, when the square of its normalised residual is larger by this than that of the next: by so much more its
+/// A length is wrong, and not another, when the square of its normalised residual is larger by this than that of the next: by so much more
+/// its
 /// removal lowers the sum of squares, as it would by chance once in e^10 times.
 const CLEARLY: f64 = 20.0;
 

@@ -30,7 +30,8 @@ pub struct Quality {
     pub images: Vec<Option<PoseSigma>>,
     /// Of the interior orientation of each camera.
     pub cameras: Vec<InteriorSigma>,
-    /// Standard deviation of each point, the root of the sum of the variances along the axes, in the order of the reconstruction; unit of the world.
+    /// Standard deviation of each point, the root of the sum of the variances along the axes, in the order of the reconstruction; unit of
+    /// the world.
     pub points: Vec<Option<f64>>,
     /// Normalised residual v / (sigma sqrt(r)), with the redundancy r, of each length that takes part, a baseline's exposures together;
     /// `None` where nothing checks it.

@@ -11,10 +11,13 @@ use crate::summary::Orientation;
 use scene::{Reconstruction, Rigid3};
 use solve::triangulate::{View, triangulate};
 
-/// Adjusts a model with known lengths, without looking for more of it: no image, point or observation is added, and those that do not fit go.
+/// Adjusts a model with known lengths, without looking for more of it: no image, point or observation is added, and those that do not fit
+/// go.
 ///
-/// Images, cameras and keypoints of the input are those of `start`, index by index; its pairs are not used. With [`RigMode::Rigid`] the rig is the one
-/// that the input gives, or where it gives none that of `start`, and an exposure has the pose of its first oriented image. Where `start` has
+/// Images, cameras and keypoints of the input are those of `start`, index by index; its pairs are not used. With [`RigMode::Rigid`] the
+/// rig is the one
+/// that the input gives, or where it gives none that of `start`, and an exposure has the pose of its first oriented image. Where `start`
+/// has
 /// no unit, the known lengths give it. A model that this made comes out as it went in.
 ///
 /// # Errors

@@ -76,7 +76,8 @@ pub struct ScaleBarReport {
     pub found_m: Option<f64>,
     /// Took no part in the adjustment.
     pub check: bool,
-    /// Error of a check over its standard deviation, which is that of the given length and that of the picks together; of a length that takes
+    /// Error of a check over its standard deviation, which is that of the given length and that of the picks together; of a length that
+    /// takes
     /// part, its normalised residual. `None` where nothing checks it.
     pub normalised_residual: Option<f64>,
 }

@@ -25,8 +25,10 @@ const MIN_FRAMES: usize = 3;
 /// The frames of the largest connected part of the view graph, all placed at once; the others that can be are registered after that.
 ///
 /// Rotations are averaged over the verified pairs, and pairs that disagree are dropped; positions of frames and points follow from the
-/// directions to the points of the longest tracks, with the arms of a known rig as their scale (Pan, Barath, Pollefeys & Schoenberger, *Global
-/// Structure-from-Motion Revisited*, ECCV 2024); then the adjustment takes over, with ever smaller tolerances. `None` where too few pairs have an
+/// directions to the points of the longest tracks, with the arms of a known rig as their scale (Pan, Barath, Pollefeys & Schoenberger,
+/// *Global
+/// Structure-from-Motion Revisited*, ECCV 2024); then the adjustment takes over, with ever smaller tolerances. `None` where too few pairs
+/// have an
 /// essential matrix.
 pub(crate) fn global_model<'a>(
     empty: &Model<'a>,

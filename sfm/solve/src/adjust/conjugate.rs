@@ -1,8 +1,10 @@
 //! Preconditioned conjugate gradients on the reduced system, for systems whose factorisation fills up.
 //!
 //! S = B - W C^-1 W^T is not formed (Agarwal et al., *Bundle adjustment in the large*, ECCV 2010): a product with it walks the points. Only
-//! the blocks with sensors, cameras and kept points, which every point meets, are formed, and so are the blocks inside *clusters* of consecutive frames:
-//! their factors precondition (Kushal & Agarwal, *Visibility based preconditioning for bundle adjustment*, CVPR 2012). The blocks on the diagonal
+//! the blocks with sensors, cameras and kept points, which every point meets, are formed, and so are the blocks inside *clusters* of
+//! consecutive frames:
+//! their factors precondition (Kushal & Agarwal, *Visibility based preconditioning for bundle adjustment*, CVPR 2012). The blocks on the
+//! diagonal
 //! of a positive definite matrix are positive definite, so the factors exist.
 
 use super::layout::Layout;
@@ -15,7 +17,8 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::{factor, solve};
 use faer::{MatMut, MatRef, Par};
 
-/// Stop when the residual, in the norm of the preconditioner, is this share of the right-hand side: a step of an inexact Newton method (Dembo,
+/// Stop when the residual, in the norm of the preconditioner, is this share of the right-hand side: a step of an inexact Newton method
+/// (Dembo,
 /// Eisenstat & Steihaug, 1982).
 const FORCING: f64 = 0.03;
 const MAX_ITERATIONS: usize = 300;

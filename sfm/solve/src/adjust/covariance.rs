@@ -22,7 +22,8 @@ const SINGULAR_SHARE: f64 = 1e-12;
 
 /// The covariance of the parameters at an optimum, and what each observation of few contributes to the redundancy.
 ///
-/// Cov = (J^T J)^-1 with the residuals divided by their given standard deviations: right where these are. What is not free, or what no residual
+/// Cov = (J^T J)^-1 with the residuals divided by their given standard deviations: right where these are. What is not free, or what no
+/// residual
 /// depends on, has none. Elements of different blocks that no residual joins are not computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Covariance {

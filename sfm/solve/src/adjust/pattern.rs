@@ -12,7 +12,8 @@ const DENSE_UNKNOWNS: usize = 300;
 const DENSE_SHARE: f64 = 0.5;
 /// A factorisation of more operations than this is compared with conjugate gradients; below, it takes about a second.
 const DIRECT_OPERATIONS: f64 = 2e10;
-/// What a step by conjugate gradients costs, in operations of a factorisation a value of W: some 30 products with it, which wait for memory.
+/// What a step by conjugate gradients costs, in operations of a factorisation a value of W: some 30 products with it, which wait for
+/// memory.
 const ITERATIVE_OPERATIONS: f64 = 600.0;
 /// Conjugate gradients keep the blocks of sensors, cameras and kept points with all others: they must be few.
 const MAX_SHARED_UNKNOWNS: usize = 1000;
@@ -41,7 +42,8 @@ pub(super) enum Kind {
     Clusters(Clusters),
 }
 
-/// Blocks of frames in clusters of consecutive ones, and of what frames share with each other: sensors, cameras, kept points. Stored are the blocks
+/// Blocks of frames in clusters of consecutive ones, and of what frames share with each other: sensors, cameras, kept points. Stored are
+/// the blocks
 /// inside a cluster and all blocks with something shared.
 #[derive(Debug)]
 pub(super) struct Clusters {
@@ -265,7 +267,8 @@ impl Meetings {
         })
     }
 
-    /// An order of elimination with little fill: approximate minimum degree (Amestoy, Davis & Duff, 1996) of the blocks, which takes a small
+    /// An order of elimination with little fill: approximate minimum degree (Amestoy, Davis & Duff, 1996) of the blocks, which takes a
+    /// small
     /// part of the time that it takes of the unknowns.
     fn order(&self) -> Vec<usize> {
         let blocks = self.bits.len() / self.words;

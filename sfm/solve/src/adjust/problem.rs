@@ -140,7 +140,8 @@ pub struct PositionObservation {
     pub sigma: Vector3<f64>,
 }
 
-/// A direction of the world that was measured in the frame of the rig, such as that of gravity: two residuals, the sines of the angles across it divided
+/// A direction of the world that was measured in the frame of the rig, such as that of gravity: two residuals, the sines of the angles
+/// across it divided
 /// by sigma.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionObservation {
@@ -154,7 +155,8 @@ pub struct DirectionObservation {
     pub sigma_rad: f64,
 }
 
-/// A measured heading of an axis of the rig, clockwise from the y axis (north) of a world whose z axis is up: the residual is the angle by which the
+/// A measured heading of an axis of the rig, clockwise from the y axis (north) of a world whose z axis is up: the residual is the angle by
+/// which the
 /// axis, seen from above, deviates, divided by sigma.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeadingObservation {

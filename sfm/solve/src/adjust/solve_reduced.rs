@@ -1,4 +1,5 @@
-//! Solution of the reduced system: Cholesky factorisation by faer, dense or sparse with one symbolic analysis for all iterations, or conjugate
+//! Solution of the reduced system: Cholesky factorisation by faer, dense or sparse with one symbolic analysis for all iterations, or
+//! conjugate
 //! gradients.
 //!
 //! Everything runs on one thread: faer's single-column solve gives other bits on several, and its sparse factorisation
@@ -88,7 +89,8 @@ impl Solver {
         }
         reduced.rhs.iter().all(|d| d.is_finite())
     }
-    /// Solves for more right-hand sides, by columns, with the factor of the last [`Solver::solve`]; `None` where there is none to solve with again.
+    /// Solves for more right-hand sides, by columns, with the factor of the last [`Solver::solve`]; `None` where there is none to solve
+    /// with again.
     pub fn solve_again(&self, reduced: &Reduced, columns: &mut [f64], count: usize) -> Option<()> {
         let n = reduced.rhs.len();
         let rhs = MatMut::from_column_major_slice_mut(columns, n, count);

@@ -12,7 +12,8 @@ pub(super) struct BlockSystem {
     column_start: Vec<usize>,
     row_index: Vec<usize>,
     values: Vec<f64>,
-    /// Nodes of each point, and for each pair i, j of them where the block begins in the first of its three columns; none above the diagonal.
+    /// Nodes of each point, and for each pair i, j of them where the block begins in the first of its three columns; none above the
+    /// diagonal.
     groups: Vec<(usize, usize)>,
     places: Vec<Option<(usize, usize)>>,
     symbolic: SymbolicCholesky<usize>,
