@@ -73,8 +73,8 @@ fn without_shear(model: &Reconstruction) -> Option<Reconstruction> {
 
 type Writer = fn(&ColmapModel<'_>, &mut dyn Write) -> std::io::Result<()>;
 
-/// Writes a model and its points as a cloud below a folder; `sigmas` of the points, or none. The shear of a camera of Brown's model is
-/// left out: COLMAP's models have none.
+/// Writes a model and its points as a cloud below a folder; `sigmas` of the points, or none. The shear of a camera of Brown's model is left
+/// out: COLMAP's models have none.
 ///
 /// # Errors
 /// When COLMAP cannot hold the model, or a file cannot be written.

@@ -30,8 +30,7 @@ pub struct OrientOptions {
     /// Share of inliers that a new frame needs.
     pub register_min_inlier_share: f64,
     /// Largest reprojection error of an observation that is kept, pixels, and twice as much while the model grows; of a keypoint with a
-    /// standard deviation below a pixel, this many
-    /// standard deviations.
+    /// standard deviation below a pixel, this many standard deviations.
     pub max_error_px: f64,
     /// Smallest intersection angle of a point that is kept, degrees.
     pub min_angle_deg: f64,

@@ -23,8 +23,7 @@ use solve::adjust::{AdjustSummary, CovarianceError};
 const MAX_FURTHER_MODELS: usize = 4;
 
 /// A length is wrong, and not another, when the square of its normalised residual is larger by this than that of the next: by so much more
-/// its
-/// removal lowers the sum of squares, as it would by chance once in e^10 times.
+/// its removal lowers the sum of squares, as it would by chance once in e^10 times.
 const CLEARLY: f64 = 20.0;
 
 /// Orients the images.

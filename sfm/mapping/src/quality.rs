@@ -122,6 +122,7 @@ fn hold_scale(problem: &mut Problem, held: u32) {
 /// Estimated over given standard deviation of the image observations.
 fn image_sigma(problem: &Problem, adjustment: &AdjustSummary) -> f64 {
     let of_lengths: f64 = adjustment.baselines.iter().chain(&adjustment.scale_bars).map(|l| l.normalised_residual.powi(2)).sum();
+    // Six of the unknowns, where the world is, are free of residuals.
     let redundancy = adjustment.residuals as f64 - adjustment.free.total as f64 + 6.0;
     let (squares, count) = (2.0 * adjustment.final_cost - of_lengths, problem.observations.len());
     if redundancy > 0.0 && squares > 0.0 && count > 0 { (squares / redundancy).sqrt() } else { 1.0 }

@@ -8,27 +8,25 @@ use crate::model::Model;
 use crate::options::OrientOptions;
 use crate::orient::{finish_start, orientation};
 use crate::summary::Orientation;
+use crate::triangulation::view;
 use scene::{Reconstruction, Rigid3};
-use solve::triangulate::{View, triangulate};
+use solve::triangulate::triangulate;
 
 /// Adjusts a model with known lengths, without looking for more of it: no image, point or observation is added, and those that do not fit
 /// go.
 ///
-/// Images, cameras and keypoints of the input are those of `start`, index by index; its pairs are not used. With [`RigMode::Rigid`] the
-/// rig is the one
-/// that the input gives, or where it gives none that of `start`, and an exposure has the pose of its first oriented image. Where `start`
-/// has
-/// no unit, the known lengths give it. A model that this made comes out as it went in.
+/// Images, cameras and keypoints of the input are those of `start`, index by index; its pairs are not used. With [`RigMode::Rigid`] the rig
+/// is the one that the input gives, or where it gives none that of `start`, and an exposure has the pose of its first oriented image. Where
+/// `start` has no unit, the known lengths give it. A model that this made comes out as it went in.
 ///
 /// # Errors
 /// [`MapError`] when the input contradicts itself or the start, or nothing is left.
 pub fn readjust(input: &MapInput, start: &Reconstruction, options: &OrientOptions) -> Result<Orientation, MapError> {
     input.check()?;
-    if start.images.len() != input.images.len() || start.keypoints.len() != input.images.len() || start.cameras.len() != input.cameras.len()
-    {
-        let counts = (start.images.len(), start.cameras.len(), input.images.len(), input.cameras.len());
-        let (a, b, c, d) = counts;
-        return Err(MapError::Inconsistent(format!("a model of {a} images by {b} cameras for an input of {c} images by {d} cameras")));
+    let sizes = |images: usize, cameras: usize| format!("{images} images by {cameras} cameras");
+    let (given, wanted) = (sizes(start.images.len(), start.cameras.len()), sizes(input.images.len(), input.cameras.len()));
+    if given != wanted || start.keypoints.len() != start.images.len() {
+        return Err(MapError::Inconsistent(format!("a model of {given} for an input of {wanted}")));
     }
     let counts: Vec<usize> = input.keypoints.iter().map(Vec::len).collect();
     let graph = CorrespondenceGraph::new(&counts, &[]);
@@ -74,6 +72,5 @@ fn mounting(input: &MapInput, start: &Reconstruction) -> Option<Vec<Rigid3>> {
 }
 
 fn retriangulated(model: &Model, track: &[scene::Observation]) -> Option<nalgebra::Vector3<f64>> {
-    let view = |&o: &scene::Observation| View::new(*model.camera(o.image), &model.cam_from_world(o.image)?, model.pixel(o));
-    triangulate(&track.iter().filter_map(view).collect::<Vec<_>>())
+    triangulate(&track.iter().filter_map(|&o| view(model, o)).collect::<Vec<_>>())
 }

@@ -77,7 +77,6 @@ pub struct ScaleBarReport {
     /// Took no part in the adjustment.
     pub check: bool,
     /// Error of a check over its standard deviation, which is that of the given length and that of the picks together; of a length that
-    /// takes
-    /// part, its normalised residual. `None` where nothing checks it.
+    /// takes part, its normalised residual. `None` where nothing checks it.
     pub normalised_residual: Option<f64>,
 }

@@ -74,7 +74,7 @@ fn create_tracks(model: &mut Model, o: Observation, options: &OrientOptions) {
     }
 }
 
-fn view(model: &Model, o: Observation) -> Option<View> {
+pub(crate) fn view(model: &Model, o: Observation) -> Option<View> {
     View::new(*model.camera(o.image), &model.cam_from_world(o.image)?, model.pixel(o))
 }
 

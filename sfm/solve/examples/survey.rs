@@ -1,8 +1,7 @@
 //! Adjusts a survey as large as that of Rofallski et al. 2020: `survey [baselines|rigid] [FRAMES POINTS]`.
 //!
 //! 1,582 exposures of three cameras, 1.6 million points and about 8 million observations with 1 px of noise and 2 % of outliers, from
-//! perturbed start
-//! values; the distances between the cameras of every exposure are observed.
+//! perturbed start values; the distances between the cameras of every exposure are observed.
 
 use nalgebra::Vector2;
 use scene::Reconstruction;

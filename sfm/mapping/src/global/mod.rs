@@ -26,10 +26,8 @@ const MIN_FRAMES: usize = 3;
 ///
 /// Rotations are averaged over the verified pairs, and pairs that disagree are dropped; positions of frames and points follow from the
 /// directions to the points of the longest tracks, with the arms of a known rig as their scale (Pan, Barath, Pollefeys & Schoenberger,
-/// *Global
-/// Structure-from-Motion Revisited*, ECCV 2024); then the adjustment takes over, with ever smaller tolerances. `None` where too few pairs
-/// have an
-/// essential matrix.
+/// *Global Structure-from-Motion Revisited*, ECCV 2024); then the adjustment takes over, with ever smaller tolerances. `None` where too few
+/// pairs have an essential matrix.
 pub(crate) fn global_model<'a>(
     empty: &Model<'a>,
     allowed: &[bool],

@@ -2,10 +2,8 @@
 //!
 //! S = B - W C^-1 W^T is not formed (Agarwal et al., *Bundle adjustment in the large*, ECCV 2010): a product with it walks the points. Only
 //! the blocks with sensors, cameras and kept points, which every point meets, are formed, and so are the blocks inside *clusters* of
-//! consecutive frames:
-//! their factors precondition (Kushal & Agarwal, *Visibility based preconditioning for bundle adjustment*, CVPR 2012). The blocks on the
-//! diagonal
-//! of a positive definite matrix are positive definite, so the factors exist.
+//! consecutive frames: their factors precondition (Kushal & Agarwal, *Visibility based preconditioning for bundle adjustment*, CVPR 2012).
+//! The blocks on the diagonal of a positive definite matrix are positive definite, so the factors exist.
 
 use super::layout::Layout;
 use super::lengths::KeptNormal;
@@ -18,8 +16,7 @@ use faer::linalg::cholesky::llt::{factor, solve};
 use faer::{MatMut, MatRef, Par};
 
 /// Stop when the residual, in the norm of the preconditioner, is this share of the right-hand side: a step of an inexact Newton method
-/// (Dembo,
-/// Eisenstat & Steihaug, 1982).
+/// (Dembo, Eisenstat & Steihaug, 1982).
 const FORCING: f64 = 0.03;
 const MAX_ITERATIONS: usize = 300;
 
@@ -87,8 +84,8 @@ impl Conjugate {
             return false;
         }
         let n = reduced.rhs.len();
-        let mut step = vec![0.0; n];
         self.residual.copy_from_slice(&reduced.rhs);
+        reduced.rhs.fill(0.0);
         self.precondition(system.parallel);
         self.direction.copy_from_slice(&self.preconditioned);
         let mut rz = dot(&self.residual, &self.preconditioned);
@@ -104,7 +101,7 @@ impl Conjugate {
             }
             let alpha = rz / curvature;
             for i in 0..n {
-                step[i] += alpha * self.direction[i];
+                reduced.rhs[i] += alpha * self.direction[i];
                 self.residual[i] -= alpha * self.product[i];
             }
             self.precondition(system.parallel);
@@ -115,8 +112,7 @@ impl Conjugate {
                 *d = z + beta * *d;
             }
         }
-        reduced.rhs.copy_from_slice(&step);
-        step.iter().all(|d| d.is_finite())
+        true
     }
 
     /// Copies the blocks of the clusters out of the panels and factorises them.

@@ -13,18 +13,16 @@ use super::solve_reduced::Solver;
 use super::state::State;
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use rayon::prelude::*;
-use scene::Rigid3;
 
 /// Columns of the inverse that are solved for at once.
 const BATCH: usize = 48;
-/// A diagonal element of the factor below this share of the largest means that the data do not determine the world.
+/// A parameter of which the others explain all but this share of its weight is not determined: the world floats.
 const SINGULAR_SHARE: f64 = 1e-12;
 
 /// The covariance of the parameters at an optimum, and what each observation of few contributes to the redundancy.
 ///
 /// Cov = (J^T J)^-1 with the residuals divided by their given standard deviations: right where these are. What is not free, or what no
-/// residual
-/// depends on, has none. Elements of different blocks that no residual joins are not computed.
+/// residual depends on, has none. Elements of different blocks that no residual joins are not computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Covariance {
     /// Of each free frame: of the step (w, d) of [`super::PoseBlock`], radians and the unit of the world.
@@ -58,18 +56,6 @@ pub enum CovarianceError {
         /// Its size.
         unknowns: usize,
     },
-}
-
-/// The covariance of a position c = -R^T t from that of the step (w, d) of its pose.
-///
-/// dc = R^T (w x t - d).
-#[must_use]
-pub fn centre_covariance(pose: &Rigid3, step: &Matrix6<f64>) -> Matrix3<f64> {
-    let r = pose.rotation_matrix().transpose();
-    let mut j = nalgebra::Matrix3x6::zeros();
-    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(-r * crate::lie::skew(&pose.translation)));
-    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-r);
-    j * step * j.transpose()
 }
 
 /// The covariance of the free parameters of a problem at its values, which should be those of an optimum.

@@ -18,8 +18,7 @@ const PARALLEL_OBSERVATIONS: usize = 4000;
 /// A step is taken when the cost falls by at least this share of what the linear model promises.
 const MIN_RELATIVE_DECREASE: f64 = 1e-3;
 /// Along directions that nothing determines (position, orientation and scale of a world without lengths) only the damping holds the step:
-/// with a
-/// larger radius the rounding errors of the gradient would move the world.
+/// with a larger radius the rounding errors of the gradient would move the world.
 const MAX_RADIUS: f64 = 1e9;
 /// Changes of the cost below this share of it drown in rounding errors: such a step is taken unseen.
 const COST_NOISE: f64 = 1e-12;

@@ -26,7 +26,7 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
-pub use covariance::{Covariance, CovarianceError, centre_covariance, covariance};
+pub use covariance::{Covariance, CovarianceError, covariance};
 pub use error::AdjustError;
 pub use lm::adjust;
 pub use options::{AdjustOptions, Loss};

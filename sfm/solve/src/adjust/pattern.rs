@@ -43,8 +43,7 @@ pub(super) enum Kind {
 }
 
 /// Blocks of frames in clusters of consecutive ones, and of what frames share with each other: sensors, cameras, kept points. Stored are
-/// the blocks
-/// inside a cluster and all blocks with something shared.
+/// the blocks inside a cluster and all blocks with something shared.
 #[derive(Debug)]
 pub(super) struct Clusters {
     /// First block of each cluster, and the end of the last, which is where the shared blocks begin.
@@ -268,8 +267,7 @@ impl Meetings {
     }
 
     /// An order of elimination with little fill: approximate minimum degree (Amestoy, Davis & Duff, 1996) of the blocks, which takes a
-    /// small
-    /// part of the time that it takes of the unknowns.
+    /// small part of the time that it takes of the unknowns.
     fn order(&self) -> Vec<usize> {
         let blocks = self.bits.len() / self.words;
         // Both triangles, by columns.

@@ -141,8 +141,7 @@ pub struct PositionObservation {
 }
 
 /// A direction of the world that was measured in the frame of the rig, such as that of gravity: two residuals, the sines of the angles
-/// across it divided
-/// by sigma.
+/// across it divided by sigma.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionObservation {
     /// Index of the frame.
@@ -156,8 +155,7 @@ pub struct DirectionObservation {
 }
 
 /// A measured heading of an axis of the rig, clockwise from the y axis (north) of a world whose z axis is up: the residual is the angle by
-/// which the
-/// axis, seen from above, deviates, divided by sigma.
+/// which the axis, seen from above, deviates, divided by sigma.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeadingObservation {
     /// Index of the frame.

@@ -1,10 +1,8 @@
 //! Residuals of what other instruments measured: positions, directions, headings, control points.
 //!
 //! With a pose `rig_from_world` = (R, t), a step (w, d) makes it (exp(w) R, t + d). A point l of the rig lies at x = R^T (l - t) in the
-//! world and moves by
-//! R^T ((l - t) x w - d); a direction g of the world is R g in the rig and moves by w x R g; a direction a of the rig is f = R^T a in the
-//! world and moves
-//! by R^T (a x w).
+//! world and moves by R^T ((l - t) x w - d); a direction g of the world is R g in the rig and moves by w x R g; a direction a of the rig is
+//! f = R^T a in the world and moves by R^T (a x w).
 
 use super::layout::Layout;
 use super::lengths::Row;

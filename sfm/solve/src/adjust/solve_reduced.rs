@@ -1,6 +1,5 @@
 //! Solution of the reduced system: Cholesky factorisation by faer, dense or sparse with one symbolic analysis for all iterations, or
-//! conjugate
-//! gradients.
+//! conjugate gradients.
 //!
 //! Everything runs on one thread: faer's single-column solve gives other bits on several, and its sparse factorisation
 //! is slower there.
@@ -10,26 +9,18 @@ use super::error::AdjustError;
 use super::layout::Layout;
 use super::pattern::{Kind, Pattern, SparsePattern};
 use super::schur::Reduced;
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use crate::numeric::sparse_cholesky::SparseCholesky;
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::{factor, solve};
 use faer::perm::PermRef;
-use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, MatRef, Par, Side};
+use faer::sparse::linalg::cholesky::SymmetricOrdering;
+use faer::{MatMut, MatRef, Par};
 
 /// Symbolic analysis and workspace.
 pub(super) enum Solver {
     Dense(MemBuffer),
-    Sparse(Sparse),
+    Sparse(SparseCholesky),
     Conjugate(Conjugate),
-}
-
-pub(super) struct Sparse {
-    column_start: Vec<usize>,
-    row_index: Vec<usize>,
-    symbolic: SymbolicCholesky<usize>,
-    factor: Vec<f64>,
-    workspace: MemBuffer,
 }
 
 impl Solver {
@@ -41,7 +32,7 @@ impl Solver {
                 let request = factor::cholesky_in_place_scratch::<f64>(unknowns, Par::Seq, Default::default());
                 MemBuffer::try_new(request).map(Self::Dense).map_err(|_| out_of_memory)
             }
-            Kind::Sparse(rows) => Sparse::new(layout, pattern, rows).map(Self::Sparse).ok_or(out_of_memory),
+            Kind::Sparse(rows) => analyse(layout, pattern, rows).map(Self::Sparse).ok_or(out_of_memory),
             Kind::Clusters(clusters) => Ok(Self::Conjugate(Conjugate::new(layout, clusters))),
         }
     }
@@ -63,23 +54,9 @@ impl Solver {
                 solve::solve_in_place(matrix.as_ref(), rhs, Par::Seq, stack);
             }
             Self::Sparse(sparse) => {
-                let stack = MemStack::new(&mut sparse.workspace);
-                let rhs = MatMut::from_column_major_slice_mut(&mut reduced.rhs, n, 1);
-                let structure = SymbolicSparseColMatRef::new_checked(n, n, &sparse.column_start, None, &sparse.row_index);
-                let matrix = SparseColMatRef::new(structure, &reduced.values);
-                let factored = sparse.symbolic.factorize_numeric_llt(
-                    &mut sparse.factor,
-                    matrix,
-                    Side::Lower,
-                    Default::default(),
-                    Par::Seq,
-                    stack,
-                    Default::default(),
-                );
-                let Ok(factor): Result<LltRef<'_, usize, f64>, _> = factored else {
+                if sparse.solve(&reduced.values, &mut reduced.rhs).is_none() {
                     return false;
-                };
-                factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
+                }
             }
             Self::Conjugate(conjugate) => {
                 if !conjugate.solve(system, reduced) {
@@ -89,54 +66,41 @@ impl Solver {
         }
         reduced.rhs.iter().all(|d| d.is_finite())
     }
+
     /// Solves for more right-hand sides, by columns, with the factor of the last [`Solver::solve`]; `None` where there is none to solve
     /// with again.
     pub fn solve_again(&self, reduced: &Reduced, columns: &mut [f64], count: usize) -> Option<()> {
         let n = reduced.rhs.len();
-        let rhs = MatMut::from_column_major_slice_mut(columns, n, count);
         match self {
             Self::Dense(_) => {
                 let factor = MatRef::from_column_major_slice(&reduced.values, n, n);
+                let rhs = MatMut::from_column_major_slice_mut(columns, n, count);
                 solve::solve_in_place(factor, rhs, Par::Seq, MemStack::new(&mut []));
+                Some(())
             }
-            Self::Sparse(sparse) => {
-                let mut memory = MemBuffer::try_new(sparse.symbolic.solve_in_place_scratch::<f64>(count, Par::Seq)).ok()?;
-                let factor = LltRef::new(&sparse.symbolic, &sparse.factor);
-                factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut memory));
-            }
-            Self::Conjugate(_) => return None,
+            Self::Sparse(sparse) => sparse.solve_again(columns, count),
+            Self::Conjugate(_) => None,
         }
-        Some(())
     }
 }
 
-impl Sparse {
-    /// The panels as compressed columns: the values of a column of a panel stand one after the other. Those above the
-    /// diagonal inside a diagonal block are stored and ignored.
-    fn new(layout: &Layout, pattern: &Pattern, rows: &SparsePattern) -> Option<Self> {
-        let n = layout.unknowns();
-        let mut column_start = vec![0];
-        let mut row_index = Vec::with_capacity(pattern.len());
-        for a in 0..layout.block_count() {
-            for _ in 0..layout.dim(a) {
-                for &(b, _) in &rows.rows[rows.rows_start[a]..rows.rows_start[a + 1]] {
-                    row_index.extend(layout.offsets[b as usize]..layout.offsets[b as usize + 1]);
-                }
-                column_start.push(row_index.len());
+/// The panels as compressed columns: the values of a column of a panel stand one after the other. Those above the
+/// diagonal inside a diagonal block are stored and ignored.
+fn analyse(layout: &Layout, pattern: &Pattern, rows: &SparsePattern) -> Option<SparseCholesky> {
+    let n = layout.unknowns();
+    let mut column_start = vec![0];
+    let mut row_index = Vec::with_capacity(pattern.len());
+    for a in 0..layout.block_count() {
+        for _ in 0..layout.dim(a) {
+            for &(b, _) in &rows.rows[rows.rows_start[a]..rows.rows_start[a + 1]] {
+                row_index.extend(layout.offsets[b as usize]..layout.offsets[b as usize + 1]);
             }
+            column_start.push(row_index.len());
         }
-        let structure = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &row_index);
-        let order = rows.unknown_order(layout);
-        let mut inverse = vec![0; n];
-        order.iter().enumerate().for_each(|(i, &u)| inverse[u] = i);
-        let order = SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n));
-        let symbolic = factorize_symbolic_cholesky(structure, Side::Lower, order, CholeskySymbolicParams::default()).ok()?;
-        let request = StackReq::or(
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
-            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
-        );
-        let workspace = MemBuffer::try_new(request).ok()?;
-        let factor = vec![0.0; symbolic.len_val()];
-        Some(Self { column_start, row_index, symbolic, factor, workspace })
     }
+    let order = rows.unknown_order(layout);
+    let mut inverse = vec![0; n];
+    order.iter().enumerate().for_each(|(i, &u)| inverse[u] = i);
+    let order = SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n));
+    SparseCholesky::new(column_start, row_index, order, 1)
 }

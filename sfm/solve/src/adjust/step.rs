@@ -9,8 +9,7 @@ use crate::robust::Loss;
 use nalgebra::Vector3;
 
 /// A point whose cost a step changes by more than this, half of what a right observation has, is adjusted alone: points with a wrong
-/// observation
-/// or a narrow angle bend more than the linear model knows, and would shorten the steps of all others.
+/// observation or a narrow angle bend more than the linear model knows, and would shorten the steps of all others.
 const RISE: f64 = 0.5;
 const SETTLE_STEPS: usize = 5;
 const SETTLE_RADIUS: f64 = 100.0;

@@ -1,24 +1,17 @@
 //! A symmetric positive definite system of 3 x 3 blocks between nodes that share a point.
 
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use crate::numeric::sparse_cholesky::SparseCholesky;
+use faer::sparse::linalg::cholesky::SymmetricOrdering;
 use nalgebra::{Matrix3, Vector3};
 
 /// The pattern, its symbolic analysis, and values.
 pub(super) struct BlockSystem {
-    nodes: usize,
-    column_start: Vec<usize>,
-    row_index: Vec<usize>,
     values: Vec<f64>,
     /// Nodes of each point, and for each pair i, j of them where the block begins in the first of its three columns; none above the
     /// diagonal.
     groups: Vec<(usize, usize)>,
     places: Vec<Option<(usize, usize)>>,
-    symbolic: SymbolicCholesky<usize>,
-    factor: Vec<f64>,
-    memory: MemBuffer,
+    cholesky: SparseCholesky,
 }
 
 impl BlockSystem {
@@ -52,17 +45,8 @@ impl BlockSystem {
                 }
             }
         }
-        let n = 3 * nodes;
-        let structure = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &row_index);
-        let symbolic =
-            factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, CholeskySymbolicParams::default()).ok()?;
-        let request = StackReq::or(
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
-            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
-        );
-        let memory = MemBuffer::try_new(request).ok()?;
-        let (values, factor) = (vec![0.0; row_index.len()], vec![0.0; symbolic.len_val()]);
-        Some(Self { nodes, column_start, row_index, values, groups: spans, places, symbolic, factor, memory })
+        let cholesky = SparseCholesky::new(column_start, row_index, SymmetricOrdering::Amd, 1)?;
+        Some(Self { values: vec![0.0; cholesky.value_count()], groups: spans, places, cholesky })
     }
 
     pub fn clear(&mut self) {
@@ -74,7 +58,7 @@ impl BlockSystem {
         let (first, len) = self.groups[group];
         if let Some((column, offset)) = self.places[first + i * len + j] {
             for c in 0..3 {
-                let at = self.column_start[column + c] + offset;
+                let at = self.cholesky.column_start[column + c] + offset;
                 for r in 0..3 {
                     self.values[at + r] += block[(r, c)];
                 }
@@ -84,33 +68,14 @@ impl BlockSystem {
 
     /// Solves (A + diag(added)) x = rhs; `None` when that is not positive definite.
     pub fn solve(&mut self, added: &[Vector3<f64>], rhs: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
-        let n = 3 * self.nodes;
         for (node, added) in added.iter().enumerate() {
             for c in 0..3 {
                 // The diagonal block stands first in its columns.
-                self.values[self.column_start[3 * node + c] + c] += added[c];
+                self.values[self.cholesky.column_start[3 * node + c] + c] += added[c];
             }
         }
         let mut x: Vec<f64> = rhs.iter().flat_map(|v| v.iter().copied()).collect();
-        let structure = SymbolicSparseColMatRef::new_checked(n, n, &self.column_start, None, &self.row_index);
-        let matrix = SparseColMatRef::new(structure, &self.values);
-        let stack = MemStack::new(&mut self.memory);
-        let factored = self.symbolic.factorize_numeric_llt(
-            &mut self.factor,
-            matrix,
-            Side::Lower,
-            Default::default(),
-            Par::Seq,
-            stack,
-            Default::default(),
-        );
-        let factor: LltRef<'_, usize, f64> = factored.ok()?;
-        factor.solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(&mut x, n, 1),
-            Par::Seq,
-            MemStack::new(&mut self.memory),
-        );
+        self.cholesky.solve(&self.values, &mut x)?;
         x.iter().all(|v| v.is_finite()).then(|| x.as_chunks::<3>().0.iter().map(|&v| Vector3::from(v)).collect())
     }
 }

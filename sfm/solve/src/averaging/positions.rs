@@ -55,11 +55,10 @@ pub struct Positioned {
 
 /// Finds positions from bearings, which must be sorted by point.
 ///
-/// Minimises the sum of rho(|v - d (X - c - o)|^2) over node positions c, points X and a scale d >= 0 of each bearing, from a random
-/// start: with d
-/// free the problem is nearly linear in each group of unknowns and converges from anywhere, as Pan, Barath, Pollefeys & Schoenberger found
-/// (*Global Structure-from-Motion Revisited*, ECCV 2024). Levenberg-Marquardt; the d and then the X are eliminated, and the system of the
-/// nodes is factorised.
+/// Minimises the sum of rho(|v - d (X - c - o)|^2) over node positions c, points X and a scale d >= 0 of each bearing, from a random start:
+/// with d free the problem is nearly linear in each group of unknowns and converges from anywhere, as Pan, Barath, Pollefeys & Schoenberger
+/// found (*Global Structure-from-Motion Revisited*, ECCV 2024). Levenberg-Marquardt; the d and then the X are eliminated, and the system of
+/// the nodes is factorised.
 ///
 /// `None` when an index is out of range, a bearing is not finite, or memory runs out.
 #[must_use]

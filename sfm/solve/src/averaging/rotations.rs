@@ -68,11 +68,9 @@ pub enum AveragingError {
 
 /// Averages rotations over a connected graph, tolerating wrong edges.
 ///
-/// From a maximum spanning tree, by rounds of a linear problem: with R <- R exp(w) the edge wants `w_b - w_a = log(R_b^-1 M R_a)`, the
-/// same graph Laplacian
-/// for each axis. Weights first minimise the sum of absolute values, then that of s^2 r^2 / (s^2 + r^2) (Geman & McClure): Chatterjee &
-/// Govindu,
-/// *Efficient and robust large-scale rotation averaging*, ICCV 2013, with iterative reweighting in both parts.
+/// From a maximum spanning tree, by rounds of a linear problem: with R <- R exp(w) the edge wants `w_b - w_a = log(R_b^-1 M R_a)`, the same
+/// graph Laplacian for each axis. Weights first minimise the sum of absolute values, then that of s^2 r^2 / (s^2 + r^2) (Geman & McClure):
+/// Chatterjee & Govindu, *Efficient and robust large-scale rotation averaging*, ICCV 2013, with iterative reweighting in both parts.
 ///
 /// # Errors
 /// [`AveragingError`].

@@ -3,3 +3,4 @@
 pub(crate) mod minimise;
 pub(crate) mod null_space;
 pub(crate) mod polynomial;
+pub(crate) mod sparse_cholesky;
