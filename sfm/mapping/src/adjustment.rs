@@ -2,7 +2,7 @@
 
 use crate::error::MapError;
 use crate::input::RigMode;
-use crate::lengths::Lengths;
+use crate::lengths::Known;
 use crate::model::Model;
 use crate::options::OrientOptions;
 use nalgebra::Vector2;
@@ -10,8 +10,11 @@ use scene::camera::{MAX_CAMERA_PARAMS, ParamKind};
 use scene::{FrameId, ImageId, PointId};
 use solve::adjust::{AdjustOptions, AdjustSummary, CameraBlock, ImageObservation, Loss, PointBlock, PoseBlock, PosePrior, Problem, adjust};
 
-/// Standard deviation of the end of a scale bar that somebody or a detector picked in an image, pixels.
+/// Standard deviation of the end of a scale bar, or of a control point, that somebody or a detector picked in an image, pixels.
 pub(crate) const PICK_SIGMA_PX: f64 = 1.0;
+
+/// Loss of positions, directions and headings: acoustic positions jump by tens of metres, compasses near steel by tens of degrees.
+const SENSOR_LOSS: Loss = Loss::Cauchy { scale_px: 3.0 };
 
 /// No parameter of a model moves by a larger share of it when it is adjusted again.
 const PARAMETER_TOLERANCE: f64 = 1e-9;
@@ -39,27 +42,27 @@ pub(crate) struct Scope<'a> {
     pub points: &'a [PointId],
     /// Interior orientation and rig are refined as far as the input allows.
     pub calibration: bool,
-    /// Known lengths that take part.
-    pub lengths: Option<&'a Lengths>,
+    /// What is known besides the images, and takes part.
+    pub known: Option<&'a Known>,
 }
 
 /// Adjusts all oriented frames, all points, and interior orientation and rig as far as the input allows.
 pub(crate) fn adjust_all(
     model: &mut Model,
-    lengths: Option<&Lengths>,
+    known: Option<&Known>,
     effort: Effort,
     options: &OrientOptions,
 ) -> Result<AdjustSummary, MapError> {
     let free_frames = vec![true; model.frames.len()];
     let points: Vec<PointId> = model.points().map(|(id, _)| id).collect();
-    run(model, &Scope { free_frames: &free_frames, points: &points, calibration: true, lengths }, effort, options)
+    run(model, &Scope { free_frames: &free_frames, points: &points, calibration: true, known }, effort, options)
 }
 
 /// The problem of [`adjust_all`], and where the elements of the model stand in it.
-pub(crate) fn whole_problem(model: &Model, lengths: Option<&Lengths>, options: &OrientOptions) -> (Problem, ProblemMap) {
+pub(crate) fn whole_problem(model: &Model, known: Option<&Known>, options: &OrientOptions) -> (Problem, ProblemMap) {
     let free_frames = vec![true; model.frames.len()];
     let points: Vec<PointId> = model.points().map(|(id, _)| id).collect();
-    build(model, &Scope { free_frames: &free_frames, points: &points, calibration: true, lengths }, options)
+    build(model, &Scope { free_frames: &free_frames, points: &points, calibration: true, known }, options)
 }
 
 /// Adjusts the scope and writes the result back.
@@ -70,6 +73,7 @@ pub(crate) fn run(model: &mut Model, scope: &Scope, effort: Effort, options: &Or
         max_iterations: effort.max_iterations,
         function_tolerance: effort.function_tolerance,
         parameter_tolerance: PARAMETER_TOLERANCE,
+        sensor_loss: SENSOR_LOSS,
         ..AdjustOptions::default()
     };
     let summary = adjust(&mut problem, &adjust_options)?;
@@ -127,12 +131,13 @@ fn build(model: &Model, scope: &Scope, options: &OrientOptions) -> (Problem, Pro
         }
     }
     let mut problem = Problem { cameras, sensors, frames, points, observations, ..Problem::default() };
-    if let Some(lengths) = scope.lengths {
-        lengths.add_to(
+    if let Some(known) = scope.known {
+        known.add_to(
             &mut problem,
             |image| sensor_of(model, &map, image),
             |image, point, pixel| observe(model, &map, image, point, pixel, PICK_SIGMA_PX),
         );
+        known.ties.add_to(&mut problem, model, &map);
     }
     (problem, map)
 }
@@ -145,7 +150,14 @@ pub(crate) fn sensor_of(model: &Model, map: &ProblemMap, image: ImageId) -> Opti
     Some((map.frames[frame.index()]?, map.first_sensor[rig.index()] + place as u32))
 }
 
-fn observe(model: &Model, map: &ProblemMap, image: ImageId, point: u32, pixel: Vector2<f64>, sigma_px: f64) -> Option<ImageObservation> {
+pub(crate) fn observe(
+    model: &Model,
+    map: &ProblemMap,
+    image: ImageId,
+    point: u32,
+    pixel: Vector2<f64>,
+    sigma_px: f64,
+) -> Option<ImageObservation> {
     let (frame, sensor) = sensor_of(model, map, image)?;
     Some(ImageObservation { frame, sensor, camera: model.images[image.index()].camera.0, point, pixel, sigma_px })
 }
@@ -222,6 +234,6 @@ pub(crate) fn adjust_around(model: &mut Model, frame: FrameId, neighbour_count: 
     points.sort_unstable();
     points.dedup();
     let effort = Effort { loss: Loss::SoftL1 { scale_px: 1.0 }, max_iterations: 15, function_tolerance: 1e-4 };
-    run(model, &Scope { free_frames: &free_frames, points: &points, calibration: false, lengths: None }, effort, options)?;
+    run(model, &Scope { free_frames: &free_frames, points: &points, calibration: false, known: None }, effort, options)?;
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! Refuses input that contradicts itself.
 
 use crate::error::MapError;
-use crate::input::{MapInput, RigMode};
-use nalgebra::Vector2;
+use crate::input::{MapInput, RigMode, WorldInput};
+use nalgebra::{Vector2, Vector3};
 use scene::Rigid3;
 
 fn are_positive(values: &[f64]) -> bool {
@@ -67,6 +67,7 @@ impl MapInput {
                 return bad(format!("a scale bar is picked at no place of image {}", pick.image));
             }
         }
+        self.world.check(self.images.len())?;
         if self.rig.poses.len() > self.cameras.len() {
             return bad(format!("{} poses in the rig of {} cameras", self.rig.poses.len(), self.cameras.len()));
         }
@@ -78,6 +79,38 @@ impl MapInput {
             }
             if pose.sigma.is_some_and(|(rotation, translation)| !are_positive(&[rotation, translation])) {
                 return bad(format!("the pose in the rig of camera {camera} has standard deviations that are not positive"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl WorldInput {
+    fn check(&self, images: usize) -> Result<(), MapError> {
+        let bad = |what: String| Err(MapError::Inconsistent(what));
+        let is_finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
+        let is_direction = |v: &Vector3<f64>| is_finite(v) && v.norm() > 0.0;
+        // Infinite: not known along this axis.
+        let are_sigmas = |v: &Vector3<f64>| v.iter().all(|s| *s > 0.0);
+        for o in &self.positions {
+            if !(is_finite(&o.in_rig) && is_finite(&o.xyz) && are_sigmas(&o.sigma_m)) {
+                return bad(format!("the position of exposure {} is not finite, or its standard deviation not positive", o.exposure));
+            }
+        }
+        let ups = self.ups.iter().map(|o| (o.exposure, is_direction(&o.up_in_rig) && are_positive(&[o.sigma_rad])));
+        let headings = self
+            .headings
+            .iter()
+            .map(|o| (o.exposure, is_direction(&o.axis_in_rig) && o.heading_rad.is_finite() && are_positive(&[o.sigma_rad])));
+        if let Some((exposure, _)) = ups.chain(headings).find(|(_, good)| !good) {
+            return bad(format!("a direction or heading of exposure {exposure} is not one, or its standard deviation not positive"));
+        }
+        for (index, point) in self.control_points.iter().enumerate() {
+            if !(is_finite(&point.xyz) && are_sigmas(&point.sigma_m)) {
+                return bad(format!("control point {index} is not finite, or its standard deviation not positive"));
+            }
+            if point.picks.iter().any(|p| p.image.index() >= images || !p.pixel.iter().all(|v| v.is_finite())) {
+                return bad(format!("control point {index} is picked in an image that does not exist, or at no place of it"));
             }
         }
         Ok(())

@@ -4,7 +4,7 @@ use crate::adjustment::{Effort, adjust_all, adjust_around};
 use crate::error::MapError;
 use crate::filter::{filter_frames, filter_points};
 use crate::initial::Start;
-use crate::lengths::Lengths;
+use crate::lengths::Known;
 use crate::model::Model;
 use crate::options::OrientOptions;
 use crate::register::{Registration, candidates, register_frame};
@@ -115,17 +115,12 @@ fn growing() -> Effort {
 }
 
 /// Adjusts, completes, merges and filters until nothing changes much. Returns the last adjustment.
-pub(crate) fn refine(
-    model: &mut Model,
-    lengths: Option<&Lengths>,
-    effort: Effort,
-    options: &OrientOptions,
-) -> Result<AdjustSummary, MapError> {
+pub(crate) fn refine(model: &mut Model, known: Option<&Known>, effort: Effort, options: &OrientOptions) -> Result<AdjustSummary, MapError> {
     complete_tracks(model, options);
     merge_tracks(model, options);
     let mut rounds = 0;
     loop {
-        let summary = adjust_all(model, lengths, effort, options)?;
+        let summary = adjust_all(model, known, effort, options)?;
         rounds += 1;
         let mut changed = complete_tracks(model, options) + merge_tracks(model, options);
         changed += filter_points(model, options);
@@ -137,19 +132,19 @@ pub(crate) fn refine(
 }
 
 /// The last adjustments: everything that can be triangulated is, and the optimum is reached.
-pub(crate) fn finish(model: &mut Model, lengths: Option<&Lengths>, options: &OrientOptions) -> Result<AdjustSummary, MapError> {
+pub(crate) fn finish(model: &mut Model, known: Option<&Known>, options: &OrientOptions) -> Result<AdjustSummary, MapError> {
     retriangulate(model, options);
-    refine(model, lengths, Effort { loss: options.loss, max_iterations: 50, function_tolerance: 1e-6 }, options)?;
+    refine(model, known, Effort { loss: options.loss, max_iterations: 50, function_tolerance: 1e-6 }, options)?;
     retriangulate(model, options);
-    refine(model, lengths, Effort { loss: options.loss, max_iterations: 50, function_tolerance: 1e-6 }, options)?;
-    settle(model, lengths, options)
+    refine(model, known, Effort { loss: options.loss, max_iterations: 50, function_tolerance: 1e-6 }, options)?;
+    settle(model, known, options)
 }
 
 /// Adjusts until nothing moves and nothing is left to filter.
-pub(crate) fn settle(model: &mut Model, lengths: Option<&Lengths>, options: &OrientOptions) -> Result<AdjustSummary, MapError> {
+pub(crate) fn settle(model: &mut Model, known: Option<&Known>, options: &OrientOptions) -> Result<AdjustSummary, MapError> {
     let mut rounds = 0;
     loop {
-        let summary = adjust_all(model, lengths, Effort::last(options), options)?;
+        let summary = adjust_all(model, known, Effort::last(options), options)?;
         rounds += 1;
         let mut removed = filter_points(model, options);
         // What goes with one frame may have been what held another.

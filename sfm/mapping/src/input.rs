@@ -1,5 +1,6 @@
 //! What an orientation starts from.
 
+use nalgebra::Vector3;
 use scene::{Camera, CameraId, ImageId, Rigid3, VerifiedPair};
 
 /// Everything that [`crate::orient`] needs; lists are indexed by the ids of `scene`.
@@ -22,6 +23,79 @@ pub struct MapInput {
     pub rig: RigInput,
     /// Known lengths in the scene.
     pub scale_bars: Vec<ScaleBarInput>,
+    /// What ties the model to the world.
+    pub world: WorldInput,
+}
+
+/// What was measured in the world: metres, x to the east, y to the north, z up. Exposures that no image belongs to are ignored.
+#[derive(Clone, Debug, Default)]
+pub struct WorldInput {
+    /// Places of points of the rig.
+    pub positions: Vec<PositionInput>,
+    /// Directions of the vertical.
+    pub ups: Vec<UpInput>,
+    /// Headings.
+    pub headings: Vec<HeadingInput>,
+    /// Points with known coordinates.
+    pub control_points: Vec<ControlPointInput>,
+}
+
+impl WorldInput {
+    /// Whether nothing is known.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty() && self.ups.is_empty() && self.headings.is_empty() && self.control_points.is_empty()
+    }
+}
+
+/// A measured place of a point of the rig: an acoustic position, or a depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionInput {
+    /// The exposure.
+    pub exposure: u32,
+    /// The point that was measured, in the frame of the rig, metres: the lever arm.
+    pub in_rig: Vector3<f64>,
+    /// Where it was.
+    pub xyz: Vector3<f64>,
+    /// Standard deviation along each axis, metres; infinite where it was not measured.
+    pub sigma_m: Vector3<f64>,
+}
+
+/// The direction of the vertical, as an inclinometer or accelerometers give it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UpInput {
+    /// The exposure.
+    pub exposure: u32,
+    /// Up, in the frame of the rig; its length does not matter.
+    pub up_in_rig: Vector3<f64>,
+    /// Standard deviation, radians.
+    pub sigma_rad: f64,
+}
+
+/// The heading of an axis of the rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeadingInput {
+    /// The exposure.
+    pub exposure: u32,
+    /// The axis, in the frame of the rig.
+    pub axis_in_rig: Vector3<f64>,
+    /// Where it points seen from above, from north over east, radians.
+    pub heading_rad: f64,
+    /// Standard deviation, radians.
+    pub sigma_rad: f64,
+}
+
+/// A point with known coordinates that was picked in images.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ControlPointInput {
+    /// Where it was picked.
+    pub picks: Vec<ImagePick>,
+    /// Where it is.
+    pub xyz: Vector3<f64>,
+    /// Standard deviation along each axis, metres; infinite where it is not known.
+    pub sigma_m: Vector3<f64>,
+    /// Takes no part in the adjustment and is only reported.
+    pub check: bool,
 }
 
 /// A camera and how far its interior orientation is trusted.

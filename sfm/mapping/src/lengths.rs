@@ -4,6 +4,7 @@ use crate::adjustment::PICK_SIGMA_PX;
 use crate::input::{BaselineInput, ImagePick, RigMode, ScaleBarInput};
 use crate::model::Model;
 use crate::summary::{BaselineReport, ScaleBarReport};
+use crate::ties::Ties;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use scene::{ImageId, Scale, Similarity3};
 use solve::adjust::{Baseline, ImageObservation, PointBlock, Problem, ScaleBar};
@@ -19,9 +20,11 @@ pub enum LengthId {
     ScaleBar(usize),
 }
 
-/// Baselines and scale bars of a model that take part in its adjustment.
+/// What is known of a model besides its images, and takes part in its adjustment.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Lengths {
+pub(crate) struct Known {
+    /// What ties it to the world.
+    pub ties: Ties,
     baselines: Vec<KnownBaseline>,
     bars: Vec<KnownBar>,
 }
@@ -45,9 +48,9 @@ struct KnownBar {
     sigma: f64,
 }
 
-impl Lengths {
+impl Known {
     /// The lengths that the oriented images of the model measure.
-    pub(crate) fn of(model: &Model) -> Self {
+    pub(crate) fn lengths_of(model: &Model) -> Self {
         let rig = &model.input.rig;
         let baselines = match rig.mode {
             RigMode::None => Vec::new(),
@@ -75,11 +78,7 @@ impl Lengths {
                 Some(KnownBar { given, ends: bar.ends.clone(), start, length: bar.length_m, sigma: bar.sigma_m })
             })
             .collect();
-        Self { baselines, bars }
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.baselines.is_empty() && self.bars.is_empty()
+        Self { baselines, bars, ties: Ties::default() }
     }
 
     /// For each given baseline that is observed, its position in the input and those of its observations in the problem.
@@ -174,33 +173,39 @@ fn distance(model: &Model, images: (ImageId, ImageId)) -> Option<f64> {
     Some((model.cam_from_world(images.0)?.centre() - model.cam_from_world(images.1)?.centre()).norm())
 }
 
-/// Both ends of a scale bar from the images in which they were picked.
+/// A point from the images in which it was picked.
+pub(crate) fn triangulated(model: &Model, picks: &[ImagePick]) -> Option<Vector3<f64>> {
+    let views: Vec<View> = picks
+        .iter()
+        .filter_map(|pick| {
+            let cam_from_world = model.cam_from_world(pick.image)?;
+            View::new(*model.camera(pick.image), &cam_from_world, Vector2::from(pick.pixel))
+        })
+        .collect();
+    if views.len() < 2 { None } else { triangulate(&views) }
+}
+
+/// Both ends of a scale bar.
 fn bar_ends(model: &Model, bar: &ScaleBarInput) -> Option<[Vector3<f64>; 2]> {
-    let end = |picks: &[ImagePick]| {
-        let views: Vec<View> = picks
-            .iter()
-            .filter_map(|pick| {
-                let cam_from_world = model.cam_from_world(pick.image)?;
-                View::new(*model.camera(pick.image), &cam_from_world, Vector2::from(pick.pixel))
-            })
-            .collect();
-        if views.len() < 2 { None } else { triangulate(&views) }
-    };
-    Some([end(&bar.ends[0])?, end(&bar.ends[1])?])
+    Some([triangulated(model, &bar.ends[0])?, triangulated(model, &bar.ends[1])?])
 }
 
 /// Changes the unit of the world.
 pub(crate) fn rescale(model: &mut Model, scale: f64) {
-    let world = Similarity3::from_scale(scale);
+    move_world(model, &Similarity3::from_scale(scale));
+}
+
+/// Moves the model into another world.
+pub(crate) fn move_world(model: &mut Model, new_from_old: &Similarity3) {
     for frame in &mut model.frames {
-        frame.rig_from_world = frame.rig_from_world.map(|pose| pose.in_new_world(&world));
+        frame.rig_from_world = frame.rig_from_world.map(|pose| pose.in_new_world(new_from_old));
     }
     for rig in &mut model.rigs {
         for sensor in &mut rig.sensors {
-            sensor.cam_from_rig.translation *= scale;
+            sensor.cam_from_rig.translation *= new_from_old.scale;
         }
     }
-    let moved: Vec<_> = model.points().map(|(id, p)| (id, p.xyz * scale)).collect();
+    let moved: Vec<_> = model.points().map(|(id, p)| (id, new_from_old.apply(&p.xyz))).collect();
     for (id, xyz) in moved {
         model.set_xyz(id, xyz);
     }
@@ -249,14 +254,19 @@ pub(crate) fn report_bars(model: &Model, scale: Scale, normalised: &[(LengthId, 
 fn picked_sigma(model: &Model, bar: &ScaleBarInput, ends: &[Vector3<f64>; 2]) -> f64 {
     let along = (ends[1] - ends[0]).normalize();
     let variance = |(picks, end): (&Vec<ImagePick>, &Vector3<f64>)| {
-        let mut normal = Matrix3::zeros();
-        for pick in picks {
-            let Some(cam_from_world) = model.cam_from_world(pick.image) else { continue };
-            let Some(p) = model.camera(pick.image).project_with_jacobians(&cam_from_world.apply(end)) else { continue };
-            let j = p.d_point * cam_from_world.rotation_matrix() / PICK_SIGMA_PX;
-            normal += j.transpose() * j;
-        }
-        normal.try_inverse().map_or(f64::INFINITY, |c| along.dot(&(c * along)))
+        picked_covariance(model, picks, end).map_or(f64::INFINITY, |c| along.dot(&(c * along)))
     };
     bar.ends.iter().zip(ends).map(variance).sum::<f64>().sqrt()
+}
+
+/// Covariance of a point that comes from its picks alone.
+pub(crate) fn picked_covariance(model: &Model, picks: &[ImagePick], xyz: &Vector3<f64>) -> Option<Matrix3<f64>> {
+    let mut normal = Matrix3::zeros();
+    for pick in picks {
+        let Some(cam_from_world) = model.cam_from_world(pick.image) else { continue };
+        let Some(p) = model.camera(pick.image).project_with_jacobians(&cam_from_world.apply(xyz)) else { continue };
+        let j = p.d_point * cam_from_world.rotation_matrix() / PICK_SIGMA_PX;
+        normal += j.transpose() * j;
+    }
+    normal.try_inverse()
 }

@@ -13,6 +13,7 @@ mod check;
 mod contradiction;
 mod error;
 mod filter;
+mod finish;
 mod frames;
 mod global;
 mod graph;
@@ -24,18 +25,24 @@ mod lengths;
 mod model;
 mod options;
 mod orient;
+mod placement;
 mod quality;
 mod readjust;
 mod register;
 mod residuals;
 mod rig;
 mod summary;
+mod ties;
 mod triangulation;
 mod visibility;
+mod world_report;
 
 pub use attempt::Made;
 pub use error::MapError;
-pub use input::{BaselineInput, CameraInput, ImageInput, ImagePick, MapInput, RigInput, RigMode, RigPoseInput, ScaleBarInput};
+pub use input::{
+    BaselineInput, CameraInput, ControlPointInput, HeadingInput, ImageInput, ImagePick, MapInput, PositionInput, RigInput, RigMode,
+    RigPoseInput, ScaleBarInput, UpInput, WorldInput,
+};
 pub use lengths::LengthId;
 pub use options::{Mapper, OrientOptions};
 pub use orient::orient;
@@ -43,3 +50,4 @@ pub use quality::{InteriorSigma, PoseSigma, Quality};
 pub use readjust::readjust;
 pub use residuals::{CameraResiduals, REGIONS, RegionResiduals, camera_residuals};
 pub use summary::{BaselineReport, LeftOut, OrientSummary, Orientation, ScaleBarReport};
+pub use world_report::{ControlPointReport, InstrumentReport, WorldReport};

@@ -1,30 +1,26 @@
 //! The way from verified pairs to models.
 
-use crate::attempt::{Made, model_of};
+use crate::attempt::model_of;
 use crate::contradiction;
 use crate::error::MapError;
+use crate::finish::{Done, finish_grown, length_notes};
 use crate::frames::{Layout, given_pose, known_rig};
 use crate::graph::CorrespondenceGraph;
-use crate::incremental::{Tries, finish, settle};
+use crate::incremental::{Tries, finish};
 use crate::initial::{Starts, from_exposures, from_pairs};
 use crate::input::{MapInput, RigMode};
 use crate::interior::{best_interior, is_plausible};
-use crate::lengths::{LengthId, Lengths, report_bars, report_baselines, rescale};
+use crate::lengths::{report_bars, report_baselines, rescale};
 use crate::model::Model;
 use crate::options::OrientOptions;
-use crate::quality::{CRITICAL, Quality, quality};
 use crate::register::Registration;
 use crate::rig::{solve_rig, with_rig};
 use crate::summary::{LeftOut, OrientSummary, Orientation};
+use crate::world_report::report_world;
 use scene::{Observation, Point, Reconstruction, Rigid3, Scale};
-use solve::adjust::{AdjustSummary, CovarianceError};
 
 /// Models beyond the first that are tried.
 const MAX_FURTHER_MODELS: usize = 4;
-
-/// A length is wrong, and not another, when the square of its normalised residual is larger by this than that of the next: by so much more
-/// its removal lowers the sum of squares, as it would by chance once in e^10 times.
-const CLEARLY: f64 = 20.0;
 
 /// Orients the images.
 ///
@@ -72,77 +68,17 @@ pub(crate) fn orientation(input: &MapInput, done: Done, mut notes: Vec<String>, 
     }
     let of_lengths = done.quality.as_ref().map_or(&[][..], |q| &q.lengths);
     notes.extend(length_notes(input, of_lengths, &done.rejected));
+    notes.extend(done.known.ties.notes.iter().cloned());
     notes.splice(0..0, contradiction::note(&done.model, options));
     let left_out_reasons = reasons(&done.model, &done.outcomes);
     let left_out = left_out_reasons.into_iter().enumerate().map(|(i, reason)| LeftOut { image: scene::ImageId::new(i), reason });
     let left_out = left_out.filter(|left| !done.model.is_oriented(left.image)).collect();
     let baselines = report_baselines(&done.model, done.scale);
     let scale_bars = report_bars(&done.model, done.scale, of_lengths);
+    let world = report_world(&done.model, &done.known.ties);
     let models = vec![reconstruction(&done.model, done.scale)];
     let Done { adjustment, quality, rejected, made, .. } = done;
-    Orientation { models, summary: OrientSummary { adjustment, made, left_out, baselines, scale_bars, quality, rejected, notes } }
-}
-
-/// Finishes a model that nobody grew here.
-pub(crate) fn finish_start<'a>(mut model: Model<'a>, mut scale: Scale, options: &OrientOptions) -> Result<Done<'a>, MapError> {
-    let outcomes = vec![None; model.images.len()];
-    if scale == Scale::Arbitrary
-        && let Some(factor) = Lengths::of(&model).scale(&model)
-    {
-        rescale(&mut model, factor);
-        scale = Scale::Metric;
-    }
-    let lengths = Lengths::of(&model);
-    let used = (scale == Scale::Metric && !lengths.is_empty()).then_some(&lengths);
-    let adjustment = settle(&mut model, used, options)?;
-    reject_wrong_lengths(model, (outcomes, scale, lengths, adjustment), options)
-}
-
-/// What the normalised residuals of the lengths say.
-fn length_notes(input: &MapInput, lengths: &[(LengthId, Option<f64>)], rejected: &[(LengthId, f64)]) -> Vec<String> {
-    let name = |id: LengthId| match id {
-        LengthId::Baseline(i) => {
-            let b = &input.rig.baselines[i];
-            let [p, q] = [b.cameras.0, b.cameras.1].map(|c| input.cameras[c.index()].name.as_str());
-            format!("the baseline of {p} and {q} ({} m)", b.length_m)
-        }
-        LengthId::ScaleBar(i) => format!("scale bar {} ({} m)", i + 1, input.scale_bars[i].length_m),
-    };
-    let out = rejected.iter().map(|&(id, w)| {
-        let name = name(id);
-        format!(
-            "{name} contradicts the other lengths (normalised residual {w:.1}, at most {CRITICAL} by chance) and was taken out: check it"
-        )
-    });
-    let against: Vec<String> = lengths
-        .iter()
-        .filter_map(|&(id, w)| Some((id, w.filter(|w| w.abs() > CRITICAL)?)))
-        .map(|(id, w)| format!("{} ({w:.1})", name(id)))
-        .collect();
-    let undecided = (!against.is_empty()).then(|| {
-        let list = against.join(", ");
-        format!("known lengths contradict each other, and which is wrong cannot be told: {list}, normalised residuals in brackets, at most {CRITICAL} by chance")
-    });
-    out.chain(undecided).collect()
-}
-
-/// A finished model.
-pub(crate) struct Done<'a> {
-    model: Model<'a>,
-    /// How the last try of each image's frame went.
-    outcomes: Vec<Option<Registration>>,
-    adjustment: AdjustSummary,
-    scale: Scale,
-    quality: Result<Quality, CovarianceError>,
-    rejected: Vec<(LengthId, f64)>,
-    made: Option<Made>,
-}
-
-impl Done<'_> {
-    /// Whether nothing is oriented.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.model.oriented_frames().is_empty()
-    }
+    Orientation { models, summary: OrientSummary { adjustment, made, left_out, baselines, scale_bars, world, quality, rejected, notes } }
 }
 
 /// How the last try of each image's frame went.
@@ -219,7 +155,7 @@ fn one_by_one<'a>(
             )),
         }
     }
-    let done = Done { made: Some(made), ..finish_metric(model, outcomes, scale, options)? };
+    let done = Done { made: Some(made), ..finish_grown(model, outcomes, scale, options)? };
     // What grew from a wrong start may fall to nothing.
     if done.is_empty() { Err(none(&from_pairs(independent, &any, options))) } else { Ok(done) }
 }
@@ -239,7 +175,7 @@ fn on_rig<'a>(
     let starts = || from_exposures(&empty, &allowed, &options.growing());
     let Ok((model, tries, made)) = model_of(&empty, starts, &allowed, true, options)? else { return Ok(None) };
     let outcomes = by_image(&model, &tries);
-    let done = Done { made: Some(made), ..finish_with_lengths(model, outcomes, scale, options)? };
+    let done = Done { made: Some(made), ..finish_grown(model, outcomes, scale, options)? };
     Ok((!done.model.oriented_frames().is_empty()).then_some(done))
 }
 
@@ -253,65 +189,6 @@ fn metres_per_unit(input: &MapInput, solved: &[Rigid3]) -> Option<f64> {
         }
     }
     Some(given_m / found).filter(|s| s.is_finite() && *s > 0.0)
-}
-
-/// Brings a model to metres where lengths are known, and adjusts it for the last time.
-fn finish_metric<'a>(
-    mut model: Model<'a>,
-    outcomes: Vec<Option<Registration>>,
-    mut scale: Scale,
-    options: &OrientOptions,
-) -> Result<Done<'a>, MapError> {
-    let lengths = Lengths::of(&model);
-    if scale == Scale::Arbitrary
-        && let Some(factor) = lengths.scale(&model)
-    {
-        rescale(&mut model, factor);
-        scale = Scale::Metric;
-    }
-    finish_with_lengths(model, outcomes, scale, options)
-}
-
-/// The last adjustments, with the known lengths.
-fn finish_with_lengths<'a>(
-    mut model: Model<'a>,
-    outcomes: Vec<Option<Registration>>,
-    scale: Scale,
-    options: &OrientOptions,
-) -> Result<Done<'a>, MapError> {
-    let lengths = Lengths::of(&model);
-    let used = (scale == Scale::Metric && !lengths.is_empty()).then_some(&lengths);
-    let adjustment = finish(&mut model, used, options)?;
-    reject_wrong_lengths(model, (outcomes, scale, lengths, adjustment), options)
-}
-
-/// Lengths that contradict the others are taken out of an adjusted model one by one, the worst first.
-fn reject_wrong_lengths<'a>(
-    mut model: Model<'a>,
-    (outcomes, scale, mut lengths, mut adjustment): (Vec<Option<Registration>>, Scale, Lengths, AdjustSummary),
-    options: &OrientOptions,
-) -> Result<Done<'a>, MapError> {
-    let mut rejected = Vec::new();
-    loop {
-        let quality = if model.oriented_frames().is_empty() {
-            Err(CovarianceError::Singular)
-        } else {
-            quality(&model, &lengths, scale, &adjustment, options)
-        };
-        let wrong = quality.as_ref().ok().and_then(|q| wrong_length(&q.lengths));
-        let Some(wrong) = wrong else { return Ok(Done { model, outcomes, adjustment, scale, quality, rejected, made: None }) };
-        rejected.push(wrong);
-        lengths = lengths.without(wrong.0);
-        adjustment = settle(&mut model, Some(&lengths), options)?;
-    }
-}
-
-/// The length that the others contradict, where there are enough of them to tell which is wrong.
-fn wrong_length(lengths: &[(LengthId, Option<f64>)]) -> Option<(LengthId, f64)> {
-    let mut ranked: Vec<(LengthId, f64)> = lengths.iter().filter_map(|&(id, w)| Some((id, w?))).collect();
-    ranked.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-    let [worst, second, _, ..] = ranked[..] else { return None };
-    (worst.1.abs() > CRITICAL && worst.1.powi(2) > second.1.powi(2) + CLEARLY).then_some(worst)
 }
 
 /// Another model from the images that are in none yet.
@@ -340,7 +217,7 @@ fn further_model<'a>(
     let starts = || from_pairs(&empty, &allowed, options);
     let Ok((model, tries, _)) = model_of(&empty, starts, &allowed, false, options)? else { return Ok(None) };
     let outcomes = by_image(&model, &tries);
-    Ok(Some(finish_metric(model, outcomes, Scale::Arbitrary, options)?).filter(enough))
+    Ok(Some(finish_grown(model, outcomes, Scale::Arbitrary, options)?).filter(enough))
 }
 
 /// Why each image of the first model has no pose.

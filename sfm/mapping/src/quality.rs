@@ -1,23 +1,29 @@
 //! How good an orientation is: standard deviations, and whether the given ones are plausible.
 
 use crate::adjustment::{ProblemMap, sensor_of, whole_problem};
-use crate::lengths::{LengthId, Lengths};
+use crate::lengths::{Known, LengthId};
 use crate::model::Model;
 use crate::options::OrientOptions;
-use nalgebra::{Matrix3, Matrix3x6};
+use crate::ties::Fixed;
+use nalgebra::{Matrix3, Matrix3x6, Vector3};
 use scene::{ImageId, Scale};
-use solve::adjust::{AdjustSummary, Baseline, Covariance, CovarianceError, Loss, Problem, covariance};
+use solve::adjust::{
+    AdjustSummary, Baseline, Covariance, CovarianceError, HeadingObservation, ImageObservation, Loss, PositionObservation, Problem,
+    covariance,
+};
 use solve::lie::skew;
 
 /// A length whose normalised residual is larger contradicts the others: one right length in a thousand does by chance (Baarda, *A testing
 /// procedure for use in geodetic networks*, 1968).
 pub(crate) const CRITICAL: f64 = 3.29;
 
-/// Standard deviations of a model. They hold in the datum of [`Quality::datum`]: errors of its pose are not in them.
+/// Standard deviations of a model. Where it is not tied to the world they hold in the datum of [`Quality::datum`]: errors of its pose are
+/// not in them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quality {
-    /// The image whose frame is held; deviations grow away from it.
-    pub datum: ImageId,
+    /// The image whose frame is held, in all or in what instruments and control points leave open; deviations grow away from it. `None`
+    /// where they fix the whole pose of the world.
+    pub datum: Option<ImageId>,
     /// Number of residuals minus number of unknowns.
     pub redundancy: f64,
     /// Estimated over given standard deviation of the image observations; all standard deviations here are stated with the estimated one.
@@ -58,36 +64,39 @@ pub struct InteriorSigma {
     pub correlations: Vec<Vec<f64>>,
 }
 
+/// As good as exact, and far from where rounding begins.
+const EXACTLY: f64 = 1e-6;
+
 /// Standard deviations of a model after its last adjustment.
 ///
 /// The image observations are weighed by what their residuals say (variance component estimation, one step), lengths as given. Outliers
 /// are gone by now, so that no loss is applied.
 pub(crate) fn quality(
     model: &Model,
-    lengths: &Lengths,
+    known: &Known,
     scale: Scale,
     adjustment: &AdjustSummary,
     options: &OrientOptions,
 ) -> Result<Quality, CovarianceError> {
-    let (mut problem, places) = whole_problem(model, (scale == Scale::Metric).then_some(lengths), options);
-    let held = hold(&mut problem);
+    let (mut problem, places) = whole_problem(model, Some(known), options);
+    let held = hold(&mut problem, known.ties.fixes);
     if scale == Scale::Arbitrary {
         hold_scale(&mut problem, held);
     }
-    let sigma0_image = image_sigma(&problem, adjustment);
+    let sigma0_image = image_sigma(&problem, adjustment.free.total);
     problem.observations.iter_mut().for_each(|o| o.sigma_px *= sigma0_image);
     let found = covariance(&problem, &Loss::Trivial)?;
     let (baseline_count, bar_count) = (adjustment.baselines.len(), adjustment.scale_bars.len());
     let (baselines, bars) = (&found.redundancy[..baseline_count], &found.redundancy[problem.baselines.len()..][..bar_count]);
     let residuals = |all: &[solve::adjust::LengthResidual]| all.iter().map(|l| l.normalised_residual).collect::<Vec<_>>();
     let (v_baselines, v_bars) = (residuals(&adjustment.baselines), residuals(&adjustment.scale_bars));
-    let groups = lengths.baseline_groups();
+    let groups = known.baseline_groups();
     let of_groups = groups.iter().map(|(given, group)| (LengthId::Baseline(*given), grouped(group, &v_baselines, baselines)));
-    let of_bars = lengths.bars_given().into_iter().enumerate();
+    let of_bars = known.bars_given().into_iter().enumerate();
     let of_bars = of_bars.map(|(i, given)| (LengthId::ScaleBar(given), grouped(&[i], &v_bars, bars)));
     let datum = model.frame_images.iter().enumerate().find(|(f, _)| places.frame(*f) == Some(held));
     Ok(Quality {
-        datum: datum.and_then(|(_, images)| images.first().copied()).unwrap_or(ImageId(0)),
+        datum: datum.and_then(|(_, images)| images.first().copied()).filter(|_| known.ties.fixes != Fixed::ALL),
         redundancy: found.total_redundancy,
         sigma0_image,
         sigma0_baselines: component(&v_baselines, baselines),
@@ -95,15 +104,31 @@ pub(crate) fn quality(
         images: (0..model.images.len()).map(|i| pose_sigma(model, ImageId::new(i), &problem, &places, &found)).collect(),
         cameras: (0..model.cameras.len()).map(|c| interior_sigma(&problem, c, &found)).collect(),
         points: points(model, &found),
-        lengths: if scale == Scale::Metric { of_groups.chain(of_bars).collect() } else { Vec::new() },
+        lengths: of_groups.chain(of_bars).collect(),
     })
 }
 
-/// Holds the frame in the middle of those that are free: nothing else fixes where the world is.
-fn hold(problem: &mut Problem) -> u32 {
+/// Holds of the frame in the middle what nothing else fixes of the pose of the world.
+fn hold(problem: &mut Problem, fixes: Fixed) -> u32 {
     let middle = problem.frames.len() / 2;
-    problem.frames[middle].free = false;
-    middle as u32
+    let frame = middle as u32;
+    if !fixes.tilt {
+        problem.frames[middle].free = false;
+        return frame;
+    }
+    let pose = problem.frames[middle].pose;
+    let centre = pose.centre();
+    let extent = problem.frames.iter().map(|f| (f.pose.centre() - centre).norm()).fold(0.0, f64::max);
+    let held = |fixed: bool| if fixed { f64::INFINITY } else { EXACTLY * extent };
+    let sigma = Vector3::new(held(fixes.horizontal), held(fixes.horizontal), held(fixes.height));
+    problem.positions.push(PositionObservation { frame, in_rig: Vector3::zeros(), xyz: centre, sigma });
+    if !fixes.heading {
+        // The axis of the rig that is furthest from the vertical has the best heading.
+        let axis_in_rig = Vector3::ith((pose.rotation * Vector3::z()).iamin(), 1.0);
+        let axis = pose.rotation.inverse() * axis_in_rig;
+        problem.headings.push(HeadingObservation { frame, axis_in_rig, heading_rad: axis.x.atan2(axis.y), sigma_rad: EXACTLY });
+    }
+    frame
 }
 
 /// Fixes the distance of the frame that is furthest from the one held.
@@ -114,18 +139,21 @@ fn hold_scale(problem: &mut Problem, held: u32) {
     let observed = |frame: u32| problem.observations.iter().find(|o| o.frame == frame).map(|o| (frame, o.sensor));
     if let Some((a, b)) = furthest.filter(|&f| f != held).and_then(|f| Some((observed(held)?, observed(f)?))) {
         let length = distance(b.0);
-        // As good as exact, and far from where rounding begins.
-        problem.baselines.push(Baseline { a, b, length, sigma: 1e-6 * length });
+        problem.baselines.push(Baseline { a, b, length, sigma: EXACTLY * length });
     }
 }
 
 /// Estimated over given standard deviation of the image observations.
-fn image_sigma(problem: &Problem, adjustment: &AdjustSummary) -> f64 {
-    let of_lengths: f64 = adjustment.baselines.iter().chain(&adjustment.scale_bars).map(|l| l.normalised_residual.powi(2)).sum();
-    // Six of the unknowns, where the world is, are free of residuals.
-    let redundancy = adjustment.residuals as f64 - adjustment.free.total as f64 + 6.0;
-    let (squares, count) = (2.0 * adjustment.final_cost - of_lengths, problem.observations.len());
-    if redundancy > 0.0 && squares > 0.0 && count > 0 { (squares / redundancy).sqrt() } else { 1.0 }
+fn image_sigma(problem: &Problem, unknowns: usize) -> f64 {
+    let square = |o: &ImageObservation| {
+        let cam_from_world = problem.sensors[o.sensor as usize].pose * problem.frames[o.frame as usize].pose;
+        let projected = problem.cameras[o.camera as usize].camera.project(&cam_from_world.apply(&problem.points[o.point as usize].xyz))?;
+        Some((projected - o.pixel).norm_squared() / (o.sigma_px * o.sigma_px))
+    };
+    let squares: f64 = problem.observations.iter().filter_map(square).sum();
+    // Seven of the unknowns, pose and unit of the world, show in no image.
+    let redundancy = 2.0 * problem.observations.len() as f64 - unknowns as f64 + 7.0;
+    if redundancy > 0.0 && squares > 0.0 { (squares / redundancy).sqrt() } else { 1.0 }
 }
 
 /// sqrt(sum v^2 / sum r).

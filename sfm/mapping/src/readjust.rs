@@ -1,12 +1,13 @@
 //! Adjusts a model that another program, or an earlier run, made.
 
 use crate::error::MapError;
+use crate::finish::finish_start;
 use crate::frames::Layout;
 use crate::graph::CorrespondenceGraph;
 use crate::input::{MapInput, RigMode};
 use crate::model::Model;
 use crate::options::OrientOptions;
-use crate::orient::{finish_start, orientation};
+use crate::orient::orientation;
 use crate::summary::Orientation;
 use crate::triangulation::view;
 use scene::{Reconstruction, Rigid3};

@@ -3,6 +3,7 @@
 use crate::attempt::Made;
 use crate::lengths::LengthId;
 use crate::quality::Quality;
+use crate::world_report::WorldReport;
 use scene::{CameraId, ImageId, Reconstruction};
 use solve::adjust::{AdjustSummary, CovarianceError};
 
@@ -28,9 +29,11 @@ pub struct OrientSummary {
     pub baselines: Vec<BaselineReport>,
     /// Known lengths in the scene and what was found.
     pub scale_bars: Vec<ScaleBarReport>,
+    /// What instruments and control points say of the first model; `None` where it is not tied to the world.
+    pub world: Option<WorldReport>,
     /// Standard deviations of the first model.
     pub quality: Result<Quality, CovarianceError>,
-    /// Lengths that contradict the others so clearly that they were taken out of the adjustment, with their normalised residuals.
+    /// Known that contradict the others so clearly that they were taken out of the adjustment, with their normalised residuals.
     pub rejected: Vec<(LengthId, f64)>,
     /// Decisions that a user should know of.
     pub notes: Vec<String>,

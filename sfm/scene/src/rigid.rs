@@ -113,17 +113,23 @@ impl Similarity3 {
     /// (the rotation about the line is free).
     #[must_use]
     pub fn align(from: &[Vector3<f64>], to: &[Vector3<f64>], with_scale: bool) -> Option<Self> {
-        if from.len() != to.len() || from.len() < 3 {
+        Self::align_weighted(from, to, &vec![1.0; from.len()], with_scale)
+    }
+
+    /// As [`Similarity3::align`], each squared error times its weight, which must be positive.
+    #[must_use]
+    pub fn align_weighted(from: &[Vector3<f64>], to: &[Vector3<f64>], weights: &[f64], with_scale: bool) -> Option<Self> {
+        if from.len() != to.len() || from.len() != weights.len() || from.len() < 3 {
             return None;
         }
-        let n = from.len() as f64;
-        let mean_from = from.iter().sum::<Vector3<f64>>() / n;
-        let mean_to = to.iter().sum::<Vector3<f64>>() / n;
+        let n: f64 = weights.iter().sum();
+        let mean = |points: &[Vector3<f64>]| points.iter().zip(weights).map(|(x, w)| x * *w).sum::<Vector3<f64>>() / n;
+        let (mean_from, mean_to) = (mean(from), mean(to));
         let mut covariance = Matrix3::zeros();
         let mut variance = 0.0;
-        for (x, y) in from.iter().zip(to) {
-            covariance += (y - mean_to) * (x - mean_from).transpose() / n;
-            variance += (x - mean_from).norm_squared() / n;
+        for ((x, y), w) in from.iter().zip(to).zip(weights) {
+            covariance += (y - mean_to) * (x - mean_from).transpose() * *w / n;
+            variance += (x - mean_from).norm_squared() * w / n;
         }
         let svd = covariance.svd(true, true);
         let (u, v_t) = (svd.u?, svd.v_t?);

@@ -9,4 +9,5 @@ mod quality;
 mod rig;
 mod single;
 mod support;
+mod world;
 mod wrong;
