@@ -40,6 +40,8 @@ pub fn report(config: &Config, done: &BTreeMap<&'static str, Stamp>) -> Value {
         "length_error": figure("orient", "length_error"),
         "baselines": figure("orient", "baselines"),
         "scale_bars": figure("orient", "scale_bars"),
+        "world": figure("orient", "world"),
+        "control_points": figure("orient", "control_points"),
         "dense": part("densify", &dense),
         "evaluation": evaluation(done.get("evaluate").map(|s| &s.figures)),
         "warnings": warnings,

@@ -16,6 +16,7 @@ pub mod recipe;
 pub mod reference;
 pub mod report;
 pub mod run;
+pub mod sensor_log;
 pub mod stage;
 pub mod stages;
 pub mod store;

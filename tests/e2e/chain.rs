@@ -20,12 +20,26 @@ fn a_rendered_dive_comes_out_as_it_is() {
         writeln!(positions, "{} {} {} {}", image.name, centre.x, centre.y, centre.z).unwrap();
     }
     dive.write("positions.txt", &positions);
+    // The first camera's places, moved 100 m east, one of them wrong; its roll and pitch.
+    let mut log = String::from("time_s,east_m,north_m,up_m,roll_deg,pitch_deg\n");
+    for (i, image) in truth.images.iter().enumerate().filter(|(_, image)| image.camera.0 == 0) {
+        let pose = truth.cam_from_world(scene::ImageId::new(i)).unwrap();
+        let time = 10 + truth.frames[image.frame.index()].exposure;
+        let jump = if image.name.ends_with("0003.png") { 5.0 } else { 0.0 };
+        let [starboard, down, forward] = [0, 1, 2].map(|k| pose.rotation_matrix().row(k).transpose());
+        let (roll, pitch) = (f64::atan2(-starboard.z, -down.z).to_degrees(), forward.z.asin().to_degrees());
+        let centre = pose.centre();
+        writeln!(log, "{time},{},{},{},{roll},{pitch}", centre.x + 100.0, centre.y + jump, centre.z).unwrap();
+    }
+    dive.write("sensors.csv", &log);
     let baseline = rendered.scene.cameras[1].cam_from_rig.centre().norm();
     dive.write(
         "dive.toml",
         &format!(
             "[[camera]]\nimages = \"frames/C1\"\n[[camera]]\nimages = \"frames/C2\"\n\
              [[rig.baseline]]\nbetween = [\"C1\", \"C2\"]\nlength_m = {baseline}\nsigma_m = 0.0005\n\
+             [world]\norigin_m = [100.0, 0.0, 0.0]\n\
+             [sensors]\nfile = \"sensors.csv\"\noffset_secs = 10.0\ninterval_secs = 1.0\nposition_sigma_m = 0.05\ntilt_sigma_deg = 0.2\n\
              [densify]\nquality = \"low\"\nmax_views = 3\nmin_views = 2\n\
              [evaluate]\nreference = \"reference.ply\"\npositions = \"positions.txt\"\nthreshold_m = 0.05\n"
         ),
@@ -40,6 +54,14 @@ fn a_rendered_dive_comes_out_as_it_is() {
     assert!(number("/evaluation/positions/rmse_m") < 0.01 * number("/evaluation/positions/path_m"));
     assert!((number("/evaluation/positions/scale") - 1.0).abs() < 0.02);
     assert!(number("/evaluation/c2m_median_m") < 0.03);
+    // The model lies where the log says: what two standard deviations of a position are.
+    assert_eq!((number("/world/horizontal/readings"), number("/world/horizontal/outliers")), (6.0, 1.0));
+    assert!(printed["world"]["heading"].is_null() && number("/precision/datum_in_world/centre_m/0") < 0.05);
+    let model = scene::format::read_colmap_binary(&dive.path("out/sparse")).unwrap();
+    let image = model.oriented_images().next().unwrap();
+    let true_image = truth.images.iter().position(|i| i.name == model.images[image.index()].name).unwrap();
+    let true_centre = truth.cam_from_world(scene::ImageId::new(true_image)).unwrap().centre();
+    assert!((model.cam_from_world(image).unwrap().centre() - true_centre).norm() < 0.1);
     assert!(number("/dense/points") > 1000.0);
     for stage in ["ingest", "mask", "features", "matching", "orient", "densify", "evaluate", "report"] {
         assert!(number(&format!("/stages/{stage}/seconds")) >= 0.0);

@@ -43,6 +43,7 @@ fn the_examples_of_the_page_are_accepted() {
         "port.mp4",
         "reference.ply",
         "positions.txt",
+        "sensors.csv",
     ] {
         let path = folder.path().join(file);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();

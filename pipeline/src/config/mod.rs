@@ -9,6 +9,7 @@ mod path_text;
 mod raw;
 mod resolve;
 mod rig;
+mod sensors;
 mod stage_options;
 mod stages;
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The configuration as resolved: every default filled in, every value checked.
 
 use super::stage_options::{DensifyConfig, EvaluateConfig, FeaturesConfig, MaskConfig, MatchingConfig, OrientConfig, ReportConfig};
+use nalgebra::UnitQuaternion;
 use scene::{CameraModel, Rigid3};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -22,6 +23,12 @@ pub struct Config {
     pub rig: RigConfig,
     /// Known lengths in the scene.
     pub scale_bars: Vec<ScaleBarConfig>,
+    /// Where the origin of the model's frame lies in the world of the sensors and control points: east, north, up, metres.
+    pub origin_m: [f64; 3],
+    /// The log of the vehicle's sensors.
+    pub sensors: Option<SensorsConfig>,
+    /// Points with known coordinates.
+    pub control_points: Vec<ControlPointConfig>,
     /// Options of the stage `mask`.
     pub mask: MaskConfig,
     /// Options of the stage `features`.
@@ -170,6 +177,57 @@ pub struct ScaleBarConfig {
     pub check: bool,
     /// Where both ends were picked.
     pub ends: [Vec<PickConfig>; 2],
+}
+
+/// The log of the vehicle's sensors, and what is known of them. Lever arms are in the frame of the first camera.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SensorsConfig {
+    /// The log. Not part of the options: its content is an input.
+    #[serde(skip)]
+    pub file: PathBuf,
+    /// Time in the log at the time 0 of the images, seconds.
+    pub offset_secs: f64,
+    /// Time between exposures, for images that do not tell theirs, seconds.
+    pub interval_secs: Option<f64>,
+    /// How much later than it was measured a position stands in the log, seconds.
+    pub position_latency_secs: f64,
+    /// Standard deviation of each coordinate of a position, metres.
+    pub position_sigma_m: f64,
+    /// Where the transponder is, metres.
+    pub position_lever_m: [f64; 3],
+    /// Standard deviation of a depth, metres.
+    pub depth_sigma_m: f64,
+    /// Where the pressure sensor is, metres.
+    pub depth_lever_m: [f64; 3],
+    /// Height of the water level in the world, metres.
+    pub water_level_m: f64,
+    /// Standard deviation of roll and pitch, degrees.
+    pub tilt_sigma_deg: f64,
+    /// Standard deviation of a heading, degrees.
+    pub heading_sigma_deg: f64,
+    /// Rotation from the body of the vehicle (x forward, y starboard, z down) to the first camera.
+    #[serde(serialize_with = "wxyz")]
+    pub camera_from_body: UnitQuaternion<f64>,
+}
+
+fn wxyz<S: serde::Serializer>(rotation: &UnitQuaternion<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    let q = rotation.quaternion();
+    [q.w, q.i, q.j, q.k].serialize(serializer)
+}
+
+/// A point with known coordinates.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ControlPointConfig {
+    /// Name, for the report.
+    pub name: String,
+    /// East, north and up, metres.
+    pub xyz_m: [f64; 3],
+    /// Standard deviation of each coordinate, metres.
+    pub sigma_m: f64,
+    /// Only compared, not used.
+    pub check: bool,
+    /// Where it was picked.
+    pub picks: Vec<PickConfig>,
 }
 
 /// A point picked in an image.

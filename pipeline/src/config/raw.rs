@@ -14,6 +14,9 @@ pub(super) struct RawConfig {
     pub(super) camera: Vec<Spanned<RawCamera>>,
     pub(super) rig: RawRig,
     pub(super) scale_bar: Vec<Spanned<RawScaleBar>>,
+    pub(super) world: RawWorld,
+    pub(super) sensors: Place<RawSensors>,
+    pub(super) control_point: Vec<Spanned<RawControlPoint>>,
     pub(super) mask: RawMask,
     pub(super) features: RawFeatures,
     pub(super) matching: RawMatching,
@@ -110,6 +113,39 @@ pub(super) struct RawPick {
     pub(super) image: Place<String>,
     pub(super) x: Place<f64>,
     pub(super) y: Place<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawWorld {
+    pub(super) origin_m: Place<Vec<f64>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawSensors {
+    pub(super) file: Place<PathText>,
+    pub(super) offset_secs: Place<f64>,
+    pub(super) interval_secs: Place<f64>,
+    pub(super) position_latency_secs: Place<f64>,
+    pub(super) position_sigma_m: Place<f64>,
+    pub(super) position_lever_m: Place<Vec<f64>>,
+    pub(super) depth_sigma_m: Place<f64>,
+    pub(super) depth_lever_m: Place<Vec<f64>>,
+    pub(super) water_level_m: Place<f64>,
+    pub(super) tilt_sigma_deg: Place<f64>,
+    pub(super) heading_sigma_deg: Place<f64>,
+    pub(super) mounting: Place<RawPose>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawControlPoint {
+    pub(super) name: Place<String>,
+    pub(super) xyz_m: Place<Vec<f64>>,
+    pub(super) sigma_m: Place<f64>,
+    pub(super) check: Place<bool>,
+    pub(super) picks: Option<Vec<Spanned<RawPick>>>,
 }
 
 #[derive(Debug, Default, Deserialize)]

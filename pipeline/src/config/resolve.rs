@@ -6,7 +6,7 @@ use super::keys::{check_names, key_at, kind_of};
 use super::model::{CameraConfig, Config, FramesFrom, ImageSource, MaskPattern};
 use super::raw::{RawCamera, RawConfig};
 use super::values::Values;
-use super::{interior, rig, stages};
+use super::{interior, rig, sensors, stages};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
@@ -74,7 +74,7 @@ pub(super) fn raw_table<T: for<'de> Deserialize<'de>>(
 }
 
 fn type_hint(key: &str) -> Option<String> {
-    if matches!(key, "camera" | "scale_bar" | "rig.baseline") {
+    if matches!(key, "camera" | "scale_bar" | "rig.baseline" | "control_point") {
         return Some(format!("write [[{key}]] in double brackets: there can be several"));
     }
     let kind = kind_of(key).or_else(|| kind_of(&format!("camera.interior.{key}")))?;
@@ -86,6 +86,9 @@ fn resolve(source: &mut Source<'_>, raw: &RawConfig, file: &Path) -> Config {
     let cameras = cameras(source, &raw.camera, folder);
     let rig = rig::resolve(source, &raw.rig, &cameras);
     let scale_bars = rig::scale_bars(source, &raw.scale_bar, &cameras);
+    let origin_m = sensors::origin(source, &raw.world);
+    let sensors = sensors::sensors(source, raw.sensors.as_ref(), folder);
+    let control_points = sensors::control_points(source, &raw.control_point, &cameras, origin_m);
     let rules = [("order", FramesFrom::Order), ("stem", FramesFrom::Stem), ("timestamp", FramesFrom::Timestamp)];
     let frames_from = Values { source }.choice("dive.frames_from", &raw.dive.frames_from, &rules).unwrap_or(FramesFrom::Order);
     let name = raw.dive.name.as_ref().map_or_else(|| "dive".to_owned(), |n| n.get_ref().clone());
@@ -100,6 +103,9 @@ fn resolve(source: &mut Source<'_>, raw: &RawConfig, file: &Path) -> Config {
         frames_from,
         rig,
         scale_bars,
+        origin_m,
+        sensors,
+        control_points,
         mask: stages::mask(source, &raw.mask, &cameras),
         features: stages::features(source, &raw.features),
         matching: stages::matching(source, &raw.matching),

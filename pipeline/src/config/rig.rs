@@ -2,7 +2,7 @@
 
 use super::error::{Source, did_you_mean};
 use super::model::{BaselineConfig, CameraConfig, PickConfig, PoseConfig, RigConfig, RigMode, ScaleBarConfig};
-use super::raw::{RawBaseline, RawPose, RawRig, RawScaleBar};
+use super::raw::{RawBaseline, RawPick, RawPose, RawRig, RawScaleBar};
 use super::values::Values;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use scene::Rigid3;
@@ -142,7 +142,7 @@ fn one_pose(values: &mut Values<'_, '_>, key: &str, entry: &Spanned<RawPose>) ->
     Some(PoseConfig { cam_from_rig: Rigid3::new(rotation, Vector3::from(translation?)), sigma })
 }
 
-fn rotation(values: &mut Values<'_, '_>, key: &str, entry: &Spanned<RawPose>) -> Option<UnitQuaternion<f64>> {
+pub(super) fn rotation(values: &mut Values<'_, '_>, key: &str, entry: &Spanned<RawPose>) -> Option<UnitQuaternion<f64>> {
     let pose = entry.get_ref();
     let given = [pose.quaternion_wxyz.is_some(), pose.axis_angle_deg.is_some(), pose.matrix.is_some()];
     if given.iter().filter(|g| **g).count() > 1 {
@@ -182,6 +182,25 @@ fn rotation(values: &mut Values<'_, '_>, key: &str, entry: &Spanned<RawPose>) ->
     Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&matrix)))
 }
 
+/// A point picked in an image.
+pub(super) fn pick(values: &mut Values<'_, '_>, key: &str, entry: &Spanned<RawPick>, cameras: &[CameraConfig]) -> Option<PickConfig> {
+    let place = entry.get_ref();
+    let [x, y] = [("x", &place.x), ("y", &place.y)].map(|(axis, value)| values.finite(&format!("{key}.{axis}"), value));
+    let (Some(image), Some(x), Some(y)) = (&place.image, x, y) else {
+        if place.image.is_none() || place.x.is_none() || place.y.is_none() {
+            values.problem(entry.span(), key, "a pick needs image, x and y");
+        }
+        return None;
+    };
+    let camera = image.get_ref().split_once('/').map_or("", |(camera, _)| camera);
+    if cameras.iter().any(|c| c.name == camera) {
+        return Some(PickConfig { image: image.get_ref().clone(), x, y });
+    }
+    let hint = "images are named by camera and file, \"C1/0001.jpg\"";
+    values.problem_with_hint(image.span(), &format!("{key}.image"), format!("there is no image \"{}\"", image.get_ref()), hint);
+    None
+}
+
 pub(super) fn scale_bars(source: &mut Source<'_>, raw: &[Spanned<RawScaleBar>], cameras: &[CameraConfig]) -> Vec<ScaleBarConfig> {
     let mut values = Values { source };
     raw.iter().enumerate().filter_map(|(i, entry)| scale_bar(&mut values, i, entry, cameras)).collect()
@@ -207,29 +226,7 @@ fn scale_bar(values: &mut Values<'_, '_>, index: usize, entry: &Spanned<RawScale
             let message = format!("each end needs picks in two images or more, one has {}", raw.len());
             values.problem(endpoints.span(), key, message);
         }
-        for pick in raw {
-            let place = pick.get_ref();
-            let (Some(image), Some(x), Some(y)) =
-                (&place.image, values.finite("scale_bar.endpoints.x", &place.x), values.finite("scale_bar.endpoints.y", &place.y))
-            else {
-                if place.image.is_none() || place.x.is_none() || place.y.is_none() {
-                    values.problem(pick.span(), key, "a pick needs image, x and y");
-                }
-                continue;
-            };
-            let camera = image.get_ref().split_once('/').map_or("", |(camera, _)| camera);
-            if cameras.iter().any(|c| c.name == camera) {
-                end.push(PickConfig { image: image.get_ref().clone(), x, y });
-            } else {
-                let hint = "images are named by camera and file, \"C1/0001.jpg\"";
-                values.problem_with_hint(
-                    image.span(),
-                    "scale_bar.endpoints.image",
-                    format!("there is no image \"{}\"", image.get_ref()),
-                    hint,
-                );
-            }
-        }
+        end.extend(raw.iter().filter_map(|p| pick(values, key, p, cameras)));
     }
     let name = bar.name.as_ref().map_or_else(|| format!("bar {}", index + 1), |n| n.get_ref().clone());
     let check = bar.check.as_ref().is_some_and(|c| *c.get_ref());

@@ -44,6 +44,8 @@ pub struct ImageEntry {
     pub position: Option<usize>,
     /// Number of the simultaneous exposure.
     pub exposure: u32,
+    /// When it was taken, seconds; `None` where neither EXIF nor a video tells it.
+    pub time_secs: Option<f64>,
     /// Columns, pixels.
     pub width: u32,
     /// Rows, pixels.

@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "ingest", version: 1, upstream: &[], options, inputs, work };
+pub const STAGE: Stage = Stage { name: "ingest", version: 2, upstream: &[], options, inputs, work };
 
 /// Frames of a video that are encoded at a time; bounds the memory.
 const FRAMES_AT_ONCE: usize = 8;
@@ -169,6 +169,7 @@ fn read_file(camera_name: &str, camera: usize, position: usize, file: &Path) -> 
             stem,
             position: Some(position),
             exposure: 0,
+            time_secs: info.exif.time_secs,
             width: info.width,
             height: info.height,
             content: Fingerprint::of_bytes(&bytes),
@@ -223,6 +224,7 @@ fn read_video(
                     stem: stem.clone(),
                     position: None,
                     exposure: 0,
+                    time_secs: Some(time - offset_secs),
                     width: image.width() as u32,
                     height: image.height() as u32,
                     content: Fingerprint::of_file(&work.store.path(&path))?,

@@ -15,3 +15,4 @@ mod orient_figures;
 mod page;
 mod pairing;
 pub mod report;
+mod world;

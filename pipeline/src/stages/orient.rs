@@ -3,22 +3,20 @@
 use super::images::{ImageEntry, ImageList};
 use super::interior::{self, Start};
 use super::orient_figures::{figures, precision_table};
-use super::{features, matching, model};
+use super::{features, matching, model, world};
 use crate::config::{Config, Mapper, RigMode, ScaleBarConfig};
 use crate::error::NoResult;
-use crate::stage::{Outcome, Stage, Work, no_inputs};
-use crate::store::{Fingerprint, Warning};
+use crate::stage::{Outcome, Stage, Work};
+use crate::store::{Fingerprint, Hashes, Warning};
 use anyhow::{Context, Result};
-use mapping::{
-    BaselineInput, CameraInput, ImageInput, ImagePick, MapError, MapInput, OrientOptions, RigInput, RigPoseInput, ScaleBarInput,
-};
+use mapping::{BaselineInput, CameraInput, ImageInput, MapError, MapInput, OrientOptions, RigInput, RigPoseInput, ScaleBarInput};
 use rayon::prelude::*;
-use scene::{CameraId, ImageId, Keypoint};
+use scene::{CameraId, Keypoint};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// The stage.
-pub const STAGE: Stage =
-    Stage { name: "orient", version: 3, upstream: &["ingest", "features", "matching"], options, inputs: no_inputs, work };
+pub const STAGE: Stage = Stage { name: "orient", version: 4, upstream: &["ingest", "features", "matching"], options, inputs, work };
 
 /// Standard deviation of a keypoint's position over its scale: what was found in a coarser image is as much less precise (Zeisl, Georgel,
 /// Schweiger, Steinbach & Navab, *Estimation of location uncertainty for scale invariant feature points*, BMVC 2009). The finest
@@ -47,7 +45,12 @@ fn options(config: &Config) -> Value {
         "interior": interior::options(config),
         "rig": {"mode": config.rig.mode, "poses": poses, "baselines": config.rig.baselines},
         "scale_bars": config.scale_bars,
+        "world": {"origin_m": config.origin_m, "sensors": config.sensors, "control_points": config.control_points},
     })
+}
+
+fn inputs(config: &Config, hashes: &Hashes) -> BTreeMap<String, String> {
+    hashes.of_files(config.sensors.iter().map(|s| ("sensors".to_owned(), s.file.clone())).collect())
 }
 
 fn work(work: &Work<'_>) -> Result<Outcome> {
@@ -142,6 +145,7 @@ fn input(work: &Work<'_>, list: &ImageList, warnings: &mut Vec<Warning>) -> Resu
         pairs,
         rig: rig(work.config),
         scale_bars: work.config.scale_bars.iter().map(|bar| scale_bar(bar, list, warnings)).collect(),
+        world: world::world(work.config, list, warnings)?,
     };
     Ok((input, starts))
 }
@@ -166,15 +170,6 @@ fn rig(config: &Config) -> RigInput {
 
 /// A pick in an image that could not be used is a warning.
 fn scale_bar(bar: &ScaleBarConfig, list: &ImageList, warnings: &mut Vec<Warning>) -> ScaleBarInput {
-    let ends = bar.ends.each_ref().map(|picks| {
-        let mut found = Vec::with_capacity(picks.len());
-        for pick in picks {
-            match list.images.iter().position(|i| i.name == pick.image) {
-                Some(i) => found.push(ImagePick { image: ImageId::new(i), pixel: [pick.x, pick.y] }),
-                None => warnings.push(Warning { about: bar.name.clone(), message: format!("there is no usable image {}", pick.image) }),
-            }
-        }
-        found
-    });
+    let ends = bar.ends.each_ref().map(|picks| world::picks(picks, &bar.name, list, warnings));
     ScaleBarInput { ends, length_m: bar.length_m, sigma_m: bar.sigma_m, check: bar.check }
 }

@@ -3,7 +3,10 @@
 use super::images::ImageList;
 use super::interior::Start;
 use crate::config::Config;
-use mapping::{CameraResiduals, InteriorSigma, LengthId, OrientSummary, Orientation, Quality, RegionResiduals, camera_residuals};
+use mapping::{
+    CameraResiduals, ControlPointReport, InstrumentReport, InteriorSigma, LengthId, OrientSummary, Orientation, Quality, RegionResiduals,
+    camera_residuals,
+};
 use scene::{Camera, CameraId, Reconstruction, Scale};
 use serde_json::{Map, Value, json};
 
@@ -23,7 +26,8 @@ pub(super) fn figures(config: &Config, list: &ImageList, starts: &[Start], orien
         "oriented": oriented, "points": model.points.len(), "observations": model.observation_count(), "reprojection_rms_px": rms,
         "reprojection_mean_px": model.mean_point_error(), "scale": scale, "cameras": cameras(list, starts, summary, model),
         "baselines": baselines(list, summary), "scale_bars": scale_bars(config, summary), "models": models, "note": note,
-        "length_error": length_error(summary), "precision": precision(summary, model),
+        "length_error": length_error(summary), "precision": precision(summary, model), "world": world(summary),
+        "control_points": control_points(config, summary),
         "mapper": {
             "way": made.map(|m| if m.global { "global" } else { "incremental" }), "reason": made.map(|m| &m.reason),
         },
@@ -92,6 +96,29 @@ fn scale_bars(config: &Config, summary: &OrientSummary) -> Vec<Value> {
     summary.scale_bars.iter().map(bar).collect()
 }
 
+fn world(summary: &OrientSummary) -> Value {
+    let Some(world) = &summary.world else { return Value::Null };
+    let of = |report: &Option<InstrumentReport>, rms: &str, unit: f64| {
+        let figures = |r: &InstrumentReport| json!({"readings": r.readings, "outliers": r.outliers, rms: r.rms * unit, "sigma0": r.sigma0});
+        report.as_ref().map(figures)
+    };
+    let degrees = 1f64.to_degrees();
+    json!({
+        "horizontal": of(&world.horizontal, "rms_m", 1.0), "height": of(&world.height, "rms_m", 1.0),
+        "tilt": of(&world.tilt, "rms_deg", degrees), "heading": of(&world.heading, "rms_deg", degrees),
+    })
+}
+
+fn control_points(config: &Config, summary: &OrientSummary) -> Vec<Value> {
+    let point = |p: &ControlPointReport| {
+        json!({
+            "name": config.control_points[p.index].name, "error_m": p.error_m.map(|e| [e.x, e.y, e.z]),
+            "normalised_residual": p.normalised_residual, "check": p.check,
+        })
+    };
+    summary.world.iter().flat_map(|w| &w.control_points).map(point).collect()
+}
+
 /// Of the lengths that were held out.
 fn length_error(summary: &OrientSummary) -> Value {
     let errors: Vec<f64> = summary.scale_bars.iter().filter(|b| b.check).filter_map(|b| Some(b.found_m? - b.given_m)).collect();
@@ -116,7 +143,10 @@ fn precision(summary: &OrientSummary, model: &Reconstruction) -> Value {
     let rotations = median_and_max(poses().map(|p| norm(&p.rotation_rad).to_degrees()).collect());
     let points = median_and_max(quality.points.iter().flatten().copied().collect());
     json!({
-        "datum": model.images[quality.datum.index()].name, "redundancy": quality.redundancy, "sigma0_image": quality.sigma0_image,
+        "datum": model.images[quality.datum.index()].name,
+        "datum_in_world": quality.datum_in_world.map(|p| json!({
+            "centre_m": p.centre, "rotation_deg": p.rotation_rad.map(f64::to_degrees),
+        })), "redundancy": quality.redundancy, "sigma0_image": quality.sigma0_image,
         "sigma0_baselines": quality.sigma0_baselines, "sigma0_scale_bars": quality.sigma0_scale_bars,
         "centre_median": centres.map(|c| c.0), "centre_max": centres.map(|c| c.1),
         "rotation_median_deg": rotations.map(|r| r.0), "rotation_max_deg": rotations.map(|r| r.1), "point_median": points.map(|p| p.0),

@@ -93,6 +93,17 @@ fn sections(figures: &Value) -> Vec<Section> {
         let (given, found) = (number(&b["given_m"], 4), number(&b["found_m"], 4));
         vec![text(&b["name"]), given, found, number(&b["error_m"], 5), number(&b["normalised_residual"], 1), role(b)]
     });
+    let points = rows(&figures["control_points"], |p| {
+        let [east, north, up] = [0, 1, 2].map(|k| number(&p["error_m"][k], 4));
+        vec![text(&p["name"]), east, north, up, number(&p["normalised_residual"], 1), role(p)]
+    });
+    let instruments =
+        [("horizontal", "positions, m"), ("height", "heights and depths, m"), ("tilt", "tilts, degrees"), ("heading", "headings, degrees")];
+    let instruments = instruments.into_iter().map(|(key, of)| (of, &figures["world"][key])).filter(|(_, i)| !i.is_null()).map(|(of, i)| {
+        let rms = if i["rms_m"].is_null() { number(&i["rms_deg"], 2) } else { number(&i["rms_m"], 3) };
+        vec![of.to_owned(), text(&i["readings"]), text(&i["outliers"]), rms, number(&i["sigma0"], 2)]
+    });
+    let instruments: Vec<_> = instruments.collect();
     let models = rows(&figures["models"], |m| vec![text(&m["images"]), text(&m["points"])]);
     let matching = &figures["matching"];
     let pairs = vec![vec![
@@ -105,10 +116,14 @@ fn sections(figures: &Value) -> Vec<Section> {
     let normalised = "A normalised residual is above 3.3 once in 1,000 times by chance.";
     let unit = if figures["scale"] == "metric" { "m" } else { "units of the model" };
     let p = &figures["precision"];
+    let in_world = &p["datum_in_world"]["centre_m"];
+    let placed = [0, 1, 2].map(|k| number(&in_world[k], 3));
+    let placed =
+        if in_world.is_null() { String::new() } else { format!(", which is placed to {} m east, north and up", placed.join(", ")) };
+    let sigma0 = number(&p["sigma0_image"], 2);
+    let datum = text(&p["datum"]);
     let datum = format!(
-        "Standard deviations relative to {}. Image observations are {} times as uncertain as assumed, and weighed so.",
-        text(&p["datum"]),
-        number(&p["sigma0_image"], 2)
+        "Standard deviations relative to {datum}{placed}. Image observations are {sigma0} times as uncertain as assumed, and weighed so."
     );
     let precision = [
         (format!("projection centres, {unit}"), "centre_median", "centre_max", 5),
@@ -121,6 +136,13 @@ fn sections(figures: &Value) -> Vec<Section> {
         section("Cameras", "Lengths in pixels.", &["camera", "images", "model", "interior orientation", "start"], cameras),
         section("Baselines", normalised, &["between", "given, m", "found, m", "sigma, m", "normalised residual", "role"], baselines),
         section("Known lengths", normalised, &["length", "given, m", "found, m", "error, m", "normalised residual", "role"], bars),
+        section("Control points", normalised, &["point", "east, m", "north, m", "up, m", "normalised residual", "role"], points),
+        section(
+            "Sensors",
+            "Root mean square residuals; sigma0 is the same over the given standard deviation. Outliers hardly weigh.",
+            &["readings of", "number", "outliers", "residual", "sigma0"],
+            instruments,
+        ),
         section("Precision", &datum, &["of", "median", "largest"], precision),
         section("Pairs of images", "", &["tried", "verified", "calibrated", "uncalibrated", "planar or panoramic"], pairs),
     ];

@@ -11,6 +11,11 @@ const BASELINE_SIGMA_M: f64 = 0.0005;
 const POSE_SIGMA_DEG: f64 = 0.02;
 /// Standard deviation of the bars, metres.
 const BAR_SIGMA_M: f64 = 0.0005;
+/// Standard deviations of the sensors: of their noise, and of what is constant in it.
+const POSITION_SIGMA_M: f64 = 0.4;
+const DEPTH_SIGMA_M: f64 = 0.05;
+const TILT_SIGMA_DEG: f64 = 0.5;
+const HEADING_SIGMA_DEG: f64 = 3.0;
 /// Picks of each end of a bar.
 const PICKS: usize = 6;
 
@@ -37,6 +42,7 @@ pub(super) fn dive_toml(dive: &DiveScene) -> String {
     if looks_apart(dive) {
         mounting(&mut text, dive);
     }
+    sensors(&mut text, dive);
     let count = dive.world.bars.len();
     for (i, bar) in dive.world.bars.iter().enumerate() {
         let ends = bar.ends.map(|end| picks(dive, &end));
@@ -87,6 +93,33 @@ fn baselines(text: &mut String, dive: &DiveScene) {
     }
     text.truncate(text.trim_end().len());
     text.push('\n');
+}
+
+/// What is known of the sensors: their places, and noise of the class of the instruments.
+fn sensors(text: &mut String, dive: &DiveScene) {
+    let s = &dive.options.sensors;
+    text.push_str("\n# The log of the vehicle places the model in the world: east, north, up from the sea bed at the middle.\n[sensors]\n");
+    let _ = writeln!(
+        text,
+        "file = \"sensors.csv\"\ninterval_secs = {}  # the frames do not tell when they were taken",
+        1.0 / dive.options.motion.rate_hz
+    );
+    let arm = |[x, y, z]: [f64; 3]| format!("[{x}, {y}, {z}]");
+    if s.position_hz > 0.0 {
+        let latency = if s.ideal { 0.0 } else { s.position_latency_s };
+        let _ = writeln!(
+            text,
+            "position_latency_secs = {latency}\nposition_sigma_m = {POSITION_SIGMA_M}\nposition_lever_m = {}",
+            arm(s.transponder_m)
+        );
+    }
+    if s.pressure_hz > 0.0 {
+        let (lever, level) = (arm(s.pressure_sensor_m), dive.options.water.depth_m);
+        let _ = writeln!(text, "depth_sigma_m = {DEPTH_SIGMA_M}\ndepth_lever_m = {lever}\nwater_level_m = {level}");
+    }
+    if s.imu_hz > 0.0 {
+        let _ = writeln!(text, "tilt_sigma_deg = {TILT_SIGMA_DEG}\nheading_sigma_deg = {HEADING_SIGMA_DEG}");
+    }
 }
 
 /// Whether a camera looks where the first one does not: it is oriented by its place in the rig.

@@ -5,25 +5,22 @@ use crate::lengths::{Known, LengthId};
 use crate::model::Model;
 use crate::options::OrientOptions;
 use crate::ties::Fixed;
-use nalgebra::{Matrix3, Matrix3x6, Vector3};
+use nalgebra::{Matrix3, Matrix3x6};
 use scene::{ImageId, Scale};
-use solve::adjust::{
-    AdjustSummary, Baseline, Covariance, CovarianceError, HeadingObservation, ImageObservation, Loss, PositionObservation, Problem,
-    covariance,
-};
+use solve::adjust::{AdjustSummary, Baseline, Covariance, CovarianceError, ImageObservation, Loss, Problem, covariance};
 use solve::lie::skew;
 
 /// A length whose normalised residual is larger contradicts the others: one right length in a thousand does by chance (Baarda, *A testing
 /// procedure for use in geodetic networks*, 1968).
 pub(crate) const CRITICAL: f64 = 3.29;
 
-/// Standard deviations of a model. Where it is not tied to the world they hold in the datum of [`Quality::datum`]: errors of its pose are
-/// not in them.
+/// Standard deviations of a model. They hold in the datum of [`Quality::datum`]: errors of its pose are not in them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quality {
-    /// The image whose frame is held, in all or in what instruments and control points leave open; deviations grow away from it. `None`
-    /// where they fix the whole pose of the world.
-    pub datum: Option<ImageId>,
+    /// The image whose frame is held; deviations grow away from it.
+    pub datum: ImageId,
+    /// How well instruments and control points place that image in the world; `None` where they leave something of its place open.
+    pub datum_in_world: Option<PoseSigma>,
     /// Number of residuals minus number of unknowns.
     pub redundancy: f64,
     /// Estimated over given standard deviation of the image observations; all standard deviations here are stated with the estimated one.
@@ -79,13 +76,22 @@ pub(crate) fn quality(
     options: &OrientOptions,
 ) -> Result<Quality, CovarianceError> {
     let (mut problem, places) = whole_problem(model, Some(known), options);
-    let held = hold(&mut problem, known.ties.fixes);
+    let held = hold(&mut problem);
     if scale == Scale::Arbitrary {
         hold_scale(&mut problem, held);
     }
     let sigma0_image = image_sigma(&problem, adjustment.free.total);
     problem.observations.iter_mut().for_each(|o| o.sigma_px *= sigma0_image);
     let found = covariance(&problem, &Loss::Trivial)?;
+    let datum = model.frame_images.iter().enumerate().find(|(f, _)| places.frame(*f) == Some(held));
+    let datum = datum.and_then(|(_, images)| images.first().copied()).unwrap_or(ImageId(0));
+    let datum_in_world = if known.ties.fixes == Fixed::ALL {
+        problem.frames[held as usize].free = true;
+        let found = covariance(&problem, &Loss::Trivial)?;
+        pose_sigma(model, datum, &problem, &places, &found)
+    } else {
+        None
+    };
     let (baseline_count, bar_count) = (adjustment.baselines.len(), adjustment.scale_bars.len());
     let (baselines, bars) = (&found.redundancy[..baseline_count], &found.redundancy[problem.baselines.len()..][..bar_count]);
     let residuals = |all: &[solve::adjust::LengthResidual]| all.iter().map(|l| l.normalised_residual).collect::<Vec<_>>();
@@ -94,9 +100,9 @@ pub(crate) fn quality(
     let of_groups = groups.iter().map(|(given, group)| (LengthId::Baseline(*given), grouped(group, &v_baselines, baselines)));
     let of_bars = known.bars_given().into_iter().enumerate();
     let of_bars = of_bars.map(|(i, given)| (LengthId::ScaleBar(given), grouped(&[i], &v_bars, bars)));
-    let datum = model.frame_images.iter().enumerate().find(|(f, _)| places.frame(*f) == Some(held));
     Ok(Quality {
-        datum: datum.and_then(|(_, images)| images.first().copied()).filter(|_| known.ties.fixes != Fixed::ALL),
+        datum,
+        datum_in_world,
         redundancy: found.total_redundancy,
         sigma0_image,
         sigma0_baselines: component(&v_baselines, baselines),
@@ -108,27 +114,11 @@ pub(crate) fn quality(
     })
 }
 
-/// Holds of the frame in the middle what nothing else fixes of the pose of the world.
-fn hold(problem: &mut Problem, fixes: Fixed) -> u32 {
+/// Holds the frame in the middle: what else fixes where the world is, is less precise than the images are among each other.
+fn hold(problem: &mut Problem) -> u32 {
     let middle = problem.frames.len() / 2;
-    let frame = middle as u32;
-    if !fixes.tilt {
-        problem.frames[middle].free = false;
-        return frame;
-    }
-    let pose = problem.frames[middle].pose;
-    let centre = pose.centre();
-    let extent = problem.frames.iter().map(|f| (f.pose.centre() - centre).norm()).fold(0.0, f64::max);
-    let held = |fixed: bool| if fixed { f64::INFINITY } else { EXACTLY * extent };
-    let sigma = Vector3::new(held(fixes.horizontal), held(fixes.horizontal), held(fixes.height));
-    problem.positions.push(PositionObservation { frame, in_rig: Vector3::zeros(), xyz: centre, sigma });
-    if !fixes.heading {
-        // The axis of the rig that is furthest from the vertical has the best heading.
-        let axis_in_rig = Vector3::ith((pose.rotation * Vector3::z()).iamin(), 1.0);
-        let axis = pose.rotation.inverse() * axis_in_rig;
-        problem.headings.push(HeadingObservation { frame, axis_in_rig, heading_rad: axis.x.atan2(axis.y), sigma_rad: EXACTLY });
-    }
-    frame
+    problem.frames[middle].free = false;
+    middle as u32
 }
 
 /// Fixes the distance of the frame that is furthest from the one held.

@@ -59,18 +59,22 @@ fn control(survey: &Survey, place: Vector3<f64>, sigma_m: f64, check: bool, rand
     ControlPointInput { picks: picks.collect(), xyz: nearest.xyz + noise(random, sigma_m), sigma_m: Vector3::repeat(sigma_m), check }
 }
 
-/// Errors of the projection centres, over their standard deviations, without any alignment.
+/// Projection centres are where they should be, without any alignment: as far off as the place of the datum, its attitude over the distance
+/// from it, and the precision relative to it allow.
 #[track_caller]
 fn assert_in_the_world(out: &Orientation, truth: &Reconstruction) {
     let model = &out.models[0];
     assert_eq!(model.scale, Scale::Metric);
     let quality = out.summary.quality.as_ref().expect("regular");
-    assert_eq!(quality.datum, None);
+    let world = quality.datum_in_world.expect("placed");
+    let centre = |i: scene::ImageId| model.cam_from_world(i).expect("oriented").centre();
     for image in model.oriented_images() {
-        let error = model.cam_from_world(image).expect("oriented").centre() - truth.cam_from_world(image).expect("true").centre();
+        let error = centre(image) - truth.cam_from_world(image).expect("true").centre();
         let sigma = quality.images[image.index()].expect("oriented").centre;
+        let turned = Vector3::from(world.rotation_rad).amax() * (centre(image) - centre(quality.datum)).norm();
         for k in 0..3 {
-            assert!(error[k].abs() < FAR * sigma[k], "image {image}, axis {k}: {} m, sigma {} m", error[k], sigma[k]);
+            let sigma = sigma[k].hypot(world.centre[k]).hypot(turned);
+            assert!(error[k].abs() < FAR * sigma, "image {image}, axis {k}: {} m, sigma {sigma} m", error[k]);
         }
     }
 }
@@ -89,7 +93,7 @@ fn one_camera_and_instruments_give_metres_in_the_world() {
         assert!((0.2..1.8).contains(&report.sigma0), "{report:?}");
     }
     // What the height of 12 readings is known to; scale, place and attitude take their share.
-    let sigma = out.summary.quality.expect("regular").images[6].expect("oriented").centre;
+    let sigma = out.summary.quality.expect("regular").datum_in_world.expect("placed").centre;
     assert!(sigma[2] < DEPTH_M && sigma[0] < POSITION_M, "{sigma:?}");
 }
 
@@ -101,7 +105,7 @@ fn an_inclinometer_levels_a_rig_and_leaves_the_rest_open() {
     input.world.ups = all.ups;
     let out = oriented(&input);
     let (model, quality) = (&out.models[0], out.summary.quality.as_ref().expect("regular"));
-    assert!(quality.datum.is_some(), "north and place are open");
+    assert!(quality.datum_in_world.is_none(), "north and place are open");
     // The mean of 12 readings, 4 standard deviations, and what the images leave open between the ends of the path.
     let most = FAR * TILT_RAD / 12f64.sqrt() + 0.002;
     for image in model.oriented_images() {
