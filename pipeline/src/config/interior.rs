@@ -3,7 +3,7 @@
 use super::error::{ConfigError, Source};
 use super::keys::check_names;
 use super::model::InteriorConfig;
-use super::raw::RawInterior;
+use super::raw::{RawFixed, RawInterior};
 use super::values::Values;
 use scene::CameraModel;
 use scene::camera::ParamKind;
@@ -15,7 +15,7 @@ const DEFAULT_MODEL: CameraModel = CameraModel::Radial;
 
 impl Default for InteriorConfig {
     fn default() -> Self {
-        Self { model: DEFAULT_MODEL, size: None, params: Vec::new(), fixed: false }
+        Self { model: DEFAULT_MODEL, size: None, params: Vec::new(), fixed: false, held: Vec::new(), sigmas: Vec::new() }
     }
 }
 
@@ -39,8 +39,11 @@ pub(super) fn resolve(source: &mut Source<'_>, folder: &Path, raw: Option<&Spann
         Ok(text) => match read_file(&path, &text) {
             Ok(mut config) => {
                 // What stands in dive.toml goes before what stands in the file.
-                if let Some(fixed) = &interior.fixed {
-                    config.fixed = *fixed.get_ref();
+                if interior.fixed.is_some() {
+                    (config.fixed, config.held) = fixed(&mut Values { source }, interior, config.model);
+                }
+                if interior.sigma.is_some() {
+                    config.sigmas = sigmas(&mut Values { source }, interior, &config);
                 }
                 return config;
             }
@@ -75,7 +78,8 @@ fn values(source: &mut Source<'_>, raw: &RawInterior, whole: std::ops::Range<usi
     if let (Some(model), false) = (model, given.is_empty()) {
         config.params = params(&mut values, model, &given, &whole);
     }
-    config.fixed = raw.fixed.as_ref().is_some_and(|f| *f.get_ref());
+    (config.fixed, config.held) = fixed(&mut values, raw, config.model);
+    config.sigmas = sigmas(&mut values, raw, &config);
     if let (true, true, Some(fixed)) = (config.fixed, given.is_empty(), &raw.fixed) {
         values.problem_with_hint(
             fixed.span(),
@@ -85,6 +89,45 @@ fn values(source: &mut Source<'_>, raw: &RawInterior, whole: std::ops::Range<usi
         );
     }
     config
+}
+
+/// Whether all parameters are fixed, and whether each is.
+fn fixed(values: &mut Values<'_, '_>, raw: &RawInterior, model: CameraModel) -> (bool, Vec<bool>) {
+    let Some(place) = &raw.fixed else { return (false, Vec::new()) };
+    let names = match place.get_ref() {
+        RawFixed::All(all) => return (*all, Vec::new()),
+        RawFixed::Some(names) => names,
+    };
+    let known = model.param_names();
+    for name in names.iter().filter(|n| !known.contains(&n.as_str())) {
+        let hint = format!("its parameters are {}", known.join(", "));
+        let message = format!("model \"{}\" has no parameter {name}", model.name());
+        values.problem_with_hint(place.span(), "camera.interior.fixed", message, hint);
+    }
+    (false, known.iter().map(|k| names.iter().any(|n| n == k)).collect())
+}
+
+/// Standard deviation of each given parameter.
+fn sigmas(values: &mut Values<'_, '_>, raw: &RawInterior, config: &InteriorConfig) -> Vec<Option<f64>> {
+    let Some(place) = &raw.sigma else { return Vec::new() };
+    let names = config.model.param_names();
+    let mut sigmas = vec![None; names.len()];
+    for (name, &sigma) in place.get_ref() {
+        let key = format!("camera.interior.sigma.{name}");
+        match names.iter().position(|n| n == name) {
+            Some(k) if config.params.get(k).copied().flatten().is_some() => sigmas[k] = Some(sigma),
+            _ => values.problem_with_hint(
+                place.span(),
+                &key,
+                "there is no such value",
+                format!("give {name} beside it, of model \"{}\"", config.model.name()),
+            ),
+        }
+        if !(sigma.is_finite() && sigma > 0.0) {
+            values.problem(place.span(), &key, format!("must be above 0, is {sigma}"));
+        }
+    }
+    sigmas
 }
 
 fn params(

@@ -115,6 +115,10 @@ pub struct InteriorConfig {
     pub params: Vec<Option<f64>>,
     /// The given parameters are not refined.
     pub fixed: bool,
+    /// Whether each parameter of the model keeps its value where the others are refined; empty where none does.
+    pub held: Vec<bool>,
+    /// Standard deviation of each given parameter; empty where none is given.
+    pub sigmas: Vec<Option<f64>>,
 }
 
 fn model_name<S: serde::Serializer>(model: &CameraModel, serializer: S) -> Result<S::Ok, S::Error> {

@@ -46,6 +46,14 @@ pub(super) struct RawCamera {
     pub(super) interior: Place<RawInterior>,
 }
 
+/// Which parameters are not refined.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, expecting = "expected true, false or a list of names of parameters")]
+pub(super) enum RawFixed {
+    All(bool),
+    Some(Vec<String>),
+}
+
 macro_rules! raw_interior {
     ($($param:ident)*) => {
         /// Interior orientation, in dive.toml or in a file of its own.
@@ -56,7 +64,8 @@ macro_rules! raw_interior {
             pub(super) model: Place<String>,
             pub(super) width: Place<u32>,
             pub(super) height: Place<u32>,
-            pub(super) fixed: Place<bool>,
+            pub(super) fixed: Place<RawFixed>,
+            pub(super) sigma: Place<BTreeMap<String, f64>>,
             $($param: Place<f64>,)*
         }
 

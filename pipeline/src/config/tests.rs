@@ -179,6 +179,33 @@ fn the_rig_mode_follows_from_what_is_known() {
     assert!(resolved("[rig]\nmode = \"rigid\"\n").rig.poses.is_empty());
 }
 
+#[test]
+fn parameters_are_fixed_and_weighed_one_by_one() {
+    let interior = |text: &str| {
+        resolved(&format!("[[camera]]\nname = \"C3\"\nimages = \"frames/left\"\ninterior = {{ {text} }}\n")).cameras[2].interior.clone()
+    };
+    let some = interior("model = \"radial\", f = 900.0, cx = 30.0, fixed = [\"k2\"], sigma = { f = 2.0, cx = 1.5 }");
+    assert_eq!((some.fixed, some.held.as_slice()), (false, [false, false, false, false, true].as_slice()));
+    assert_eq!(some.sigmas, [Some(2.0), Some(1.5), None, None, None]);
+    let all = interior("model = \"radial\", f = 900.0, fixed = true");
+    assert_eq!((all.fixed, all.held.len(), all.sigmas.len()), (true, 0, 0));
+    for (text, message) in [
+        (
+            "model = \"radial\", f = 900.0, fixed = [\"k3\"]",
+            "camera.interior.fixed: model \"radial\" has no parameter k3\n  hint: its parameters are f, cx, cy, k1, k2",
+        ),
+        (
+            "model = \"radial\", f = 900.0, sigma = { k1 = 0.1 }",
+            "camera.interior.sigma.k1: there is no such value\n  hint: give k1 beside it, of model \"radial\"",
+        ),
+        ("model = \"radial\", f = 900.0, sigma = { f = 0.0 }", "camera.interior.sigma.f: must be above 0, is 0"),
+        ("model = \"radial\", f = 900.0, fixed = 3", "expected true, false or a list of names of parameters"),
+    ] {
+        let found = messages(&format!("[[camera]]\nname = \"C3\"\nimages = \"frames/left\"\ninterior = {{ {text} }}\n"));
+        assert!(found.contains(message), "{found}");
+    }
+}
+
 /// The same rotation three ways: 90 degrees about y maps z to x.
 #[test]
 fn rotations_agree_in_every_form() {

@@ -37,6 +37,10 @@ pub struct Start {
     pub camera: Camera,
     /// They are not refined.
     pub fixed: bool,
+    /// Whether each keeps its value where the others are refined; empty where none does.
+    pub held: Vec<bool>,
+    /// Standard deviation of each; empty where none is given.
+    pub sigmas: Vec<Option<f64>>,
     /// Where they come from.
     pub origin: Origin,
     /// What else a guess could be.
@@ -74,14 +78,19 @@ fn start(interior: &InteriorConfig, entry: &CameraEntry, warnings: &mut Vec<Warn
     let (width, height) = entry.size.unwrap_or((1, 1));
     if !interior.params.is_empty() {
         let camera = given(interior, entry, (width, height), warnings)?;
-        return Ok(Start { camera, fixed: interior.fixed, origin: Origin::Given, alternatives: Vec::new() });
+        // Pixels count for more in a larger image.
+        let factor = interior.size.map_or(1.0, |size| f64::from(width) / f64::from(size.0));
+        let scaled = |(sigma, kind): (&Option<f64>, &ParamKind)| sigma.map(|s| if *kind == ParamKind::Distortion { s } else { s * factor });
+        let sigmas = interior.sigmas.iter().zip(interior.model.param_kinds()).map(scaled).collect();
+        let (fixed, held) = (interior.fixed, interior.held.clone());
+        return Ok(Start { camera, fixed, held, sigmas, origin: Origin::Given, alternatives: Vec::new() });
     }
     let (focal, origin) = match entry.exif_focal_px {
         Some(focal) => (focal, Origin::Exif),
         None => (GUESS * f64::from(width.max(height)), Origin::Guess),
     };
     let camera = Camera::from_focal(interior.model, width, height, focal)?;
-    Ok(Start { camera, fixed: false, origin, alternatives: Vec::new() })
+    Ok(Start { camera, fixed: false, held: interior.held.clone(), sigmas: Vec::new(), origin, alternatives: Vec::new() })
 }
 
 /// Adds to each guess what else it could be: what the verified pairs of the camera tell, where they tell anything, and other focal lengths.
@@ -162,7 +171,7 @@ mod tests {
     }
 
     fn given(params: Vec<Option<f64>>, size: Option<(u32, u32)>) -> InteriorConfig {
-        InteriorConfig { model: CameraModel::Pinhole, size, params, fixed: true }
+        InteriorConfig { model: CameraModel::Pinhole, size, params, fixed: true, ..InteriorConfig::default() }
     }
 
     #[test]

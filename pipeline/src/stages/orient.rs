@@ -135,6 +135,8 @@ fn input(work: &Work<'_>, list: &ImageList, warnings: &mut Vec<Warning>) -> Resu
                 name: entry.name.clone(),
                 camera: s.camera,
                 fixed: s.fixed,
+                held: s.held.clone(),
+                sigmas: s.sigmas.clone(),
                 alternatives: s.alternatives.clone(),
             })
             .collect(),

@@ -21,7 +21,14 @@ fn input(cameras: usize) -> MapInput {
         cameras: truth
             .cameras
             .iter()
-            .map(|&camera| CameraInput { name: "camera".into(), camera, fixed: false, alternatives: Vec::new() })
+            .map(|&camera| CameraInput {
+                name: "camera".into(),
+                camera,
+                fixed: false,
+                held: Vec::new(),
+                sigmas: Vec::new(),
+                alternatives: Vec::new(),
+            })
             .collect(),
         images: images.collect(),
         keypoints: truth.keypoints,

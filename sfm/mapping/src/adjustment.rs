@@ -8,7 +8,9 @@ use crate::options::OrientOptions;
 use nalgebra::Vector2;
 use scene::camera::{MAX_CAMERA_PARAMS, ParamKind};
 use scene::{FrameId, ImageId, PointId};
-use solve::adjust::{AdjustOptions, AdjustSummary, CameraBlock, ImageObservation, Loss, PointBlock, PoseBlock, PosePrior, Problem, adjust};
+use solve::adjust::{
+    AdjustOptions, AdjustSummary, CameraBlock, ImageObservation, Loss, ParamPrior, PointBlock, PoseBlock, PosePrior, Problem, adjust,
+};
 
 /// Standard deviation of the end of a scale bar, or of a control point, that somebody or a detector picked in an image, pixels.
 pub(crate) const PICK_SIGMA_PX: f64 = 1.0;
@@ -166,11 +168,15 @@ fn camera_block(model: &Model, camera: usize, oriented: &[ImageId], calibration:
     let block = model.cameras[camera];
     let images = oriented.iter().filter(|i| model.images[i.index()].camera.index() == camera).count();
     let refine = calibration && !model.input.cameras[camera].fixed && images >= options.refine_interior_from;
-    let mut free = [false; MAX_CAMERA_PARAMS];
-    for (free, kind) in free.iter_mut().zip(block.model().param_kinds()) {
-        *free = refine && (*kind != ParamKind::PrincipalPoint || options.refine_principal_point);
+    let input = &model.input.cameras[camera];
+    let (mut free, mut priors) = ([false; MAX_CAMERA_PARAMS], [None; MAX_CAMERA_PARAMS]);
+    for (k, kind) in block.model().param_kinds().iter().enumerate() {
+        let sigma = input.sigmas.get(k).copied().flatten();
+        let asked = *kind != ParamKind::PrincipalPoint || options.refine_principal_point || sigma.is_some();
+        free[k] = refine && asked && !input.held.get(k).is_some_and(|h| *h);
+        priors[k] = sigma.map(|sigma| ParamPrior { value: input.camera.params()[k], sigma });
     }
-    CameraBlock { camera: block, free, priors: [None; MAX_CAMERA_PARAMS] }
+    CameraBlock { camera: block, free, priors }
 }
 
 /// A camera's pose in the rig is refined when it is not given, or given with a standard deviation.

@@ -25,6 +25,18 @@ impl MapInput {
                 return bad(format!("image {} is the second of camera {} in exposure {}", image.name, image.camera, image.exposure));
             }
         }
+        for camera in &self.cameras {
+            let (held, sigmas, count) = (camera.held.len(), camera.sigmas.len(), camera.camera.params().len());
+            if (held != 0 && held != count) || (sigmas != 0 && sigmas != count) {
+                return bad(format!(
+                    "camera {} has {count} parameters, but {held} are held or not and {sigmas} have deviations or not",
+                    camera.name
+                ));
+            }
+            if !camera.sigmas.iter().flatten().all(|s| are_positive(&[*s])) {
+                return bad(format!("a standard deviation of a parameter of camera {} is not positive", camera.name));
+            }
+        }
         for pair in &self.pairs {
             let (a, b) = (pair.images.0.index(), pair.images.1.index());
             if a == b || a >= self.images.len() || b >= self.images.len() {

@@ -107,6 +107,11 @@ pub struct CameraInput {
     pub camera: Camera,
     /// The values are not refined.
     pub fixed: bool,
+    /// Whether each parameter keeps its value where the others are refined; empty where none does.
+    pub held: Vec<bool>,
+    /// Standard deviation of each start value, which is then an observation; empty where none is known. A principal point with one is
+    /// refined in any case.
+    pub sigmas: Vec<Option<f64>>,
     /// Other start values for a camera of which little is known: the one with which a small model fits best is taken.
     pub alternatives: Vec<Camera>,
 }

@@ -93,3 +93,30 @@ fn precise_keypoints_weigh_more() {
     // Mean of the variances 0.52, of the weights 13: sqrt(1 / (13 * 0.52)) = 0.38 in the mean of many such surveys.
     assert!(weighted < 0.6 * equal, "{weighted} weighted, {equal} not");
 }
+
+#[test]
+fn parameters_are_held_weighed_and_free_one_by_one() {
+    let camera = Camera::new(CameraModel::SimpleRadial, 960, 600, &[800.0, 480.0, 300.0, -0.05]).expect("valid");
+    let made = survey(&SurveyOptions { camera, points: 4000, ..noisy(1) });
+    let mut input = input(&made);
+    // The principal point is 6 px off in y, and known to a pixel; x is held.
+    input.cameras[0].camera = Camera::new(CameraModel::SimpleRadial, 960, 600, &[790.0, 480.5, 306.0, 0.0]).expect("valid");
+    input.cameras[0].fixed = false;
+    input.cameras[0].held = vec![false, true, false, false];
+    let with = |sigma: f64| {
+        let mut input = input.clone();
+        input.cameras[0].sigmas = vec![None, None, Some(sigma), None];
+        let out = oriented(&input);
+        (out.models[0].cameras[0].params().to_vec(), out.summary.quality.expect("regular").cameras[0].clone())
+    };
+    let (loose, sigma) = with(100.0);
+    assert_eq!((loose[1], sigma.parameters.as_slice()), (480.5, [0, 2, 3].as_slice()));
+    // Four standard deviations, of which the shift of x takes one more.
+    for (k, truth) in [(0, 800.0), (2, 300.0), (3, -0.05)] {
+        let s = sigma.sigmas[sigma.parameters.iter().position(|&p| p == k).expect("refined")];
+        assert!((loose[k] - truth).abs() < 5.0 * s, "parameter {k}: {} of {truth}, sigma {s}", loose[k]);
+    }
+    // A weight far above that of the images keeps the value.
+    let (tight, sigma) = with(0.001);
+    assert!((tight[2] - 306.0).abs() < 0.01 && sigma.sigmas[1] < 0.0011, "{tight:?}");
+}

@@ -38,7 +38,14 @@ pub fn input(survey: &Survey) -> MapInput {
         cameras: truth
             .cameras
             .iter()
-            .map(|&camera| CameraInput { name: "camera".into(), camera, fixed: true, alternatives: Vec::new() })
+            .map(|&camera| CameraInput {
+                name: "camera".into(),
+                camera,
+                fixed: true,
+                held: Vec::new(),
+                sigmas: Vec::new(),
+                alternatives: Vec::new(),
+            })
             .collect(),
         images: truth.images.iter().map(image).collect(),
         keypoints: truth.keypoints.clone(),
