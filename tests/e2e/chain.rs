@@ -84,6 +84,32 @@ fn a_rendered_dive_comes_out_as_it_is() {
     assert_eq!(page.matches("data:image/jpeg;base64,").count(), 12);
     assert!(!page.contains("http://") && !page.contains("https://"));
 
+    // The model of another program, here our own in another unit: dive.toml gives it metres again, and its place.
+    let mut other = scene::format::read_colmap_binary(&dive.path("out/sparse")).unwrap();
+    let world = scene::Similarity3::from_scale(3.0);
+    other.points.iter_mut().for_each(|p| p.xyz = world.apply(&p.xyz));
+    other.rigs.iter_mut().flat_map(|r| &mut r.sensors).for_each(|s| s.cam_from_rig.translation *= 3.0);
+    other.frames.iter_mut().for_each(|f| f.rig_from_world = f.rig_from_world.map(|pose| pose.in_new_world(&world)));
+    std::fs::create_dir_all(dive.path("other")).unwrap();
+    scene::format::write_colmap_binary(&other, &dive.path("other")).unwrap();
+    let adjusted: Value = serde_json::from_str(&dive.ok(&["orient", "--from", "other", "--json"])).unwrap();
+    assert_eq!((&adjusted["scale"], &adjusted["images"]["oriented"]), (&"metric".into(), &12.into()));
+    assert!((adjusted["baselines"][0]["found_m"].as_f64().unwrap() - baseline).abs() < 0.002 * baseline);
+    let again = scene::format::read_colmap_binary(&dive.path("out/adjusted")).unwrap();
+    for image in again.oriented_images() {
+        let name = &again.images[image.index()].name;
+        let first = model.images.iter().position(|i| i.name == *name).unwrap();
+        let moved = again.cam_from_world(image).unwrap().centre() - model.cam_from_world(scene::ImageId::new(first)).unwrap().centre();
+        // Its observations weigh alike, those of the run by their scale: less than the standard deviation of a position.
+        assert!(moved.norm() < 0.05, "{name} {moved:?}");
+    }
+    assert!(dive.fails(&["orient", "--from", "other"]).1.contains("out/adjusted is not empty"));
+    other.images[3].name = "C9/1.png".to_owned();
+    std::fs::create_dir_all(dive.path("wrong")).unwrap();
+    scene::format::write_colmap_binary(&other, &dive.path("wrong")).unwrap();
+    let (code, message) = dive.fails(&["orient", "--from", "wrong", "--out", "no"]);
+    assert!(code == 2 && message.contains("image C9/1.png of the model is none of dive.toml"), "{message}");
+
     // Nothing is left to do; a changed option of one stage leaves those before it done.
     let stages =
         |text: String| -> Vec<String> { text.lines().map(|l| l.split_whitespace().take(2).collect::<Vec<_>>().join(" ")).collect() };

@@ -180,6 +180,8 @@ fn every_example_is_read() {
         "kitti-1/image_r",
         "haltbrekken/left",
         "haltbrekken/right",
+        "aurlab-tower/left",
+        "aurlab-tower/right",
     ] {
         std::fs::create_dir_all(dive.path(&format!("data/{folder}"))).unwrap();
         std::fs::write(dive.path(&format!("data/{folder}/0.png")), support::png(8, 8, 1)).unwrap();
@@ -200,7 +202,7 @@ fn every_example_is_read() {
         assert_eq!(without.status.code(), Some(2));
         assert!(String::from_utf8_lossy(&without.stderr).contains("the environment variable SFM_DATA is not set"));
     }
-    assert!(count >= 6, "{count} examples");
+    assert!(count >= 7, "{count} examples");
 }
 
 /// What a variable holds is a path, not a pattern; a calibration for another aspect is an error of the file, told before the work.

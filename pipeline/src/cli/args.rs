@@ -34,6 +34,8 @@ pub enum Command {
     Synth(SynthArgs),
     /// Measure a cloud against a reference in the same frame.
     Eval(EvalArgs),
+    /// Adjust a model that another program made with the rig, lengths, sensors and control points of a dive.toml.
+    Orient(OrientArgs),
     /// Adjust a bundle problem as it is: a file of "Bundle Adjustment in the Large" or a COLMAP model.
     Bundle(BundleArgs),
     /// Explain a command; `sfm help json` explains the keys of report.json.
@@ -193,6 +195,26 @@ pub struct EvalArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sfm orient`.
+#[derive(Debug, Args)]
+pub struct OrientArgs {
+    /// The configuration: its cameras name the images of the model.
+    #[arg(default_value = "dive.toml")]
+    pub dive: PathBuf,
+    /// Folder of the binary COLMAP model.
+    #[arg(long, value_name = "MODEL")]
+    pub from: PathBuf,
+    /// Folder for the adjusted model, new or empty [default: adjusted, in the output folder].
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print the figures as JSON, with the keys of report.json.
     #[arg(long)]
     pub json: bool,
 }

@@ -7,6 +7,7 @@ mod eval;
 mod help;
 mod init;
 mod keys;
+mod orient;
 mod run;
 mod status;
 mod summary;

@@ -28,6 +28,8 @@ pub enum Origin {
     Exif,
     /// Nothing.
     Guess,
+    /// A model of another program.
+    Model,
 }
 
 /// A start and where it comes from.

@@ -1,5 +1,6 @@
 //! The stages: each loads what it needs, calls an algorithm of another package, and saves what came out.
 
+pub mod adopt;
 pub mod densify;
 pub mod evaluate;
 pub mod features;

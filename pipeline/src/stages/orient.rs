@@ -1,6 +1,6 @@
 //! Where every camera stood, and where the points are.
 
-use super::images::{ImageEntry, ImageList};
+use super::images::{CameraEntry, ImageEntry, ImageList};
 use super::interior::{self, Start};
 use super::orient_figures::{figures, precision_table};
 use super::{features, matching, model, world};
@@ -11,7 +11,7 @@ use crate::store::{Fingerprint, Hashes, Warning};
 use anyhow::{Context, Result};
 use mapping::{BaselineInput, CameraInput, ImageInput, MapError, MapInput, OrientOptions, RigInput, RigPoseInput, ScaleBarInput};
 use rayon::prelude::*;
-use scene::{CameraId, Keypoint};
+use scene::{CameraId, Keypoint, VerifiedPair};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -92,7 +92,7 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
     Ok(Outcome { figures: figures(work.config, &list, &starts, &orientation, largest), warnings })
 }
 
-fn options_of(config: &Config) -> OrientOptions {
+pub(super) fn options_of(config: &Config) -> OrientOptions {
     let o = &config.orient;
     OrientOptions {
         mapper: match o.mapper {
@@ -126,30 +126,45 @@ fn input(work: &Work<'_>, list: &ImageList, warnings: &mut Vec<Warning>) -> Resu
     let pairs = matching::load(work, list)?;
     let (mut starts, _) = interior::starts(work.config, list)?;
     interior::add_alternatives(&mut starts, list, &keypoints, &pairs, work.config)?;
-    let image = |image: &ImageEntry| ImageInput { name: image.name.clone(), camera: CameraId::new(image.camera), exposure: image.exposure };
-    let input = MapInput {
-        cameras: starts
-            .iter()
-            .zip(&list.cameras)
-            .map(|(s, entry)| CameraInput {
-                name: entry.name.clone(),
-                camera: s.camera,
-                fixed: s.fixed,
-                held: s.held.clone(),
-                sigmas: s.sigmas.clone(),
-                alternatives: s.alternatives.clone(),
-            })
-            .collect(),
-        images: list.images.iter().map(image).collect(),
-        keypoints: keypoints.iter().map(|some| some.iter().map(|k| [k.x, k.y]).collect()).collect(),
+    let found = Found {
         sigmas_px: keypoints.iter().map(|some| some.iter().map(|k| SIGMA_OF_SCALE * k.scale).collect()).collect(),
+        keypoints: keypoints.iter().map(|some| some.iter().map(|k| [k.x, k.y]).collect()).collect(),
         colours,
         pairs,
-        rig: rig(work.config),
-        scale_bars: work.config.scale_bars.iter().map(|bar| scale_bar(bar, list, warnings)).collect(),
-        world: world::world(work.config, list, warnings)?,
     };
-    Ok((input, starts))
+    Ok((assemble(work.config, list, &starts, found, warnings)?, starts))
+}
+
+/// What was found in the images, as `mapping` takes it.
+pub(super) struct Found {
+    pub(super) keypoints: Vec<Vec<[f32; 2]>>,
+    pub(super) sigmas_px: Vec<Vec<f32>>,
+    pub(super) colours: Vec<Vec<[u8; 3]>>,
+    pub(super) pairs: Vec<VerifiedPair>,
+}
+
+/// What was found in the images, with all that dive.toml knows.
+pub(super) fn assemble(config: &Config, list: &ImageList, starts: &[Start], found: Found, warnings: &mut Vec<Warning>) -> Result<MapInput> {
+    let image = |image: &ImageEntry| ImageInput { name: image.name.clone(), camera: CameraId::new(image.camera), exposure: image.exposure };
+    let camera = |(s, entry): (&Start, &CameraEntry)| CameraInput {
+        name: entry.name.clone(),
+        camera: s.camera,
+        fixed: s.fixed,
+        held: s.held.clone(),
+        sigmas: s.sigmas.clone(),
+        alternatives: s.alternatives.clone(),
+    };
+    Ok(MapInput {
+        cameras: starts.iter().zip(&list.cameras).map(camera).collect(),
+        images: list.images.iter().map(image).collect(),
+        keypoints: found.keypoints,
+        sigmas_px: found.sigmas_px,
+        colours: found.colours,
+        pairs: found.pairs,
+        rig: rig(config),
+        scale_bars: config.scale_bars.iter().map(|bar| scale_bar(bar, list, warnings)).collect(),
+        world: world::world(config, list, warnings)?,
+    })
 }
 
 fn rig(config: &Config) -> RigInput {

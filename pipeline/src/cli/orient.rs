@@ -1,0 +1,32 @@
+//! `sfm orient`.
+
+use super::args::OrientArgs;
+use super::dispatch::{print, start_threads};
+use super::summary::summary;
+use crate::config;
+use crate::stages::adopt::readjust;
+use anyhow::{Context, Result, bail};
+use scene::format::{read_colmap_binary, write_colmap_binary};
+use serde_json::json;
+
+pub(super) fn orient(args: &OrientArgs) -> Result<()> {
+    start_threads(args.threads)?;
+    let config = config::read(&args.dive)?;
+    let model = read_colmap_binary(&args.from).with_context(|| args.from.display().to_string())?;
+    let out = args.out.clone().unwrap_or_else(|| config.output.join("adjusted"));
+    if std::fs::read_dir(&out).is_ok_and(|mut files| files.next().is_some()) {
+        bail!("{} is not empty: give another folder with --out, or empty it", out.display());
+    }
+    let done = readjust(&config, &model)?;
+    std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
+    write_colmap_binary(&done.model, &out).with_context(|| out.display().to_string())?;
+    for warning in &done.warnings {
+        eprintln!("warning: {}: {}", warning.about, warning.message);
+    }
+    let mut report = done.figures;
+    report["images"] = json!({"oriented": report["oriented"], "total": model.images.len()});
+    if args.json {
+        return print(&format!("{}\n", serde_json::to_string_pretty(&report)?));
+    }
+    print(&format!("{}{:<10} {}  (COLMAP model)\n", summary(&report, &out, |_| false), "open", out.display()))
+}

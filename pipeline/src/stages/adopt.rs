@@ -1,0 +1,190 @@
+//! A model that another program made, as a start for the adjustment: its images are those of dive.toml.
+
+use super::images::{CameraEntry, ImageEntry, ImageList};
+use super::interior::{self, Origin, Start};
+use super::orient::{Found, assemble, options_of};
+use super::orient_figures::figures;
+use super::pairing::{Exposure, pair_up};
+use crate::config::{Config, FramesFrom, ImageSource};
+use crate::error::{Misfit, NoResult};
+use crate::store::{Fingerprint, Warning};
+use anyhow::Result;
+use mapping::MapError;
+use scene::{CameraId, Frame, FrameId, Reconstruction, Rig, RigId, RigSensor, Rigid3};
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// A model after its adjustment, and what is told of it.
+pub struct Readjusted {
+    /// The model.
+    pub model: Reconstruction,
+    /// Figures as in report.json.
+    pub figures: Value,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// Adjusts a model with the rig, lengths, sensors and control points of a dive.toml; nothing is added to it. What dive.toml gives of an
+/// interior orientation goes before what the model has.
+///
+/// # Errors
+/// When the model does not belong to the images of dive.toml, or nothing of it is left.
+pub fn readjust(config: &Config, model: &Reconstruction) -> Result<Readjusted> {
+    let mut warnings = Vec::new();
+    let places = model.images.iter().map(|image| place_of(config, &image.name)).collect::<Result<Vec<_>>>()?;
+    let cameras = cameras_of(config, model, &places)?;
+    let list = image_list(config, model, &places, &cameras, &mut warnings);
+    let start = flat(model, &list, &cameras);
+    let (given, notes) = interior::starts(config, &list)?;
+    warnings.extend(notes);
+    let starts: Vec<Start> = given.into_iter().zip(&start.cameras).map(|(given, &camera)| adopted(given, camera)).collect();
+    let mut colours: Vec<Vec<[u8; 3]>> = model.keypoints.iter().map(|k| vec![[128; 3]; k.len()]).collect();
+    for point in &model.points {
+        point.track.iter().for_each(|o| colours[o.image.index()][o.keypoint.index()] = point.colour);
+    }
+    let found = Found { keypoints: model.keypoints.clone(), sigmas_px: vec![Vec::new(); model.images.len()], colours, pairs: Vec::new() };
+    let input = assemble(config, &list, &starts, found, &mut warnings)?;
+    let orientation = match mapping::readjust(&input, &start, &options_of(config)) {
+        Ok(orientation) => orientation,
+        Err(error @ MapError::Inconsistent(_)) => return Err(NoResult(error.to_string()).into()),
+        Err(error) => return Err(error.into()),
+    };
+    warnings.extend(orientation.summary.notes.iter().map(|note| Warning { about: "orientation".to_owned(), message: note.clone() }));
+    let mut figures = figures(config, &list, &starts, &orientation, &orientation.models[0]);
+    let told: Vec<Value> = warnings.iter().map(|w| json!({"about": w.about, "message": w.message})).collect();
+    figures["warnings"] = told.into();
+    let model = orientation.models.into_iter().next().ok_or_else(|| NoResult("nothing is left of the model".to_owned()))?;
+    Ok(Readjusted { model, figures, warnings })
+}
+
+/// The model's interior orientation, where dive.toml gives none.
+fn adopted(given: Start, camera: scene::Camera) -> Start {
+    if given.origin == Origin::Given {
+        return given;
+    }
+    let held = if given.held.len() == camera.params().len() { given.held } else { Vec::new() };
+    Start { camera, fixed: false, held, sigmas: Vec::new(), origin: Origin::Model, alternatives: Vec::new() }
+}
+
+/// Camera and position of an image, by its name in the model: `camera/file`, or the end of the file's path.
+fn place_of(config: &Config, name: &str) -> Result<(usize, usize)> {
+    let mut ends = Vec::new();
+    for (c, camera) in config.cameras.iter().enumerate() {
+        let of_camera = name.strip_prefix(&camera.name).and_then(|rest| rest.strip_prefix('/'));
+        match &camera.images {
+            ImageSource::Files(files) => {
+                let file_of = |p: &Path| p.file_name().map(|n| n.to_string_lossy().into_owned());
+                if let Some(p) = of_camera.and_then(|file| files.iter().position(|p| file_of(p).as_deref() == Some(file))) {
+                    return Ok((c, p));
+                }
+                ends.extend(files.iter().position(|p| p.ends_with(name)).map(|p| (c, p)));
+            }
+            ImageSource::Video { .. } => {
+                if let Some(p) = of_camera.and_then(|file| file.strip_suffix(".png")?.parse().ok()) {
+                    return Ok((c, p));
+                }
+            }
+        }
+    }
+    match ends[..] {
+        [place] => Ok(place),
+        [] => Err(Misfit(format!(
+            "image {name} of the model is none of dive.toml: images are found as `camera/file` or by the end of their path"
+        ))
+        .into()),
+        _ => Err(Misfit(format!(
+            "image {name} of the model can be one of several cameras of dive.toml: name the model's images `camera/file`"
+        ))
+        .into()),
+    }
+}
+
+/// The camera of the model for each camera of dive.toml.
+fn cameras_of(config: &Config, model: &Reconstruction, places: &[(usize, usize)]) -> Result<Vec<CameraId>> {
+    let mut used: Vec<BTreeSet<CameraId>> = vec![BTreeSet::new(); config.cameras.len()];
+    for (image, &(camera, _)) in model.images.iter().zip(places) {
+        used[camera].insert(image.camera);
+    }
+    let one = |(camera, used): (&crate::config::CameraConfig, &BTreeSet<CameraId>)| match used.len() {
+        1 => Ok(*used.first().expect("one")),
+        0 => Err(Misfit(format!("the model has no image of camera {}: leave it out of dive.toml", camera.name)).into()),
+        n => Err(Misfit(format!("the model has {n} interior orientations for images of camera {}, which has one", camera.name)).into()),
+    };
+    config.cameras.iter().zip(&used).map(one).collect()
+}
+
+fn image_list(
+    config: &Config,
+    model: &Reconstruction,
+    places: &[(usize, usize)],
+    cameras: &[CameraId],
+    warnings: &mut Vec<Warning>,
+) -> ImageList {
+    let size = |c: usize| (model.cameras[cameras[c].index()].width(), model.cameras[cameras[c].index()].height());
+    let file = |camera: usize, position: usize| match &config.cameras[camera].images {
+        ImageSource::Files(files) => files.get(position),
+        ImageSource::Video { .. } => None,
+    };
+    // Only this rule needs to open the files.
+    let time = |camera, position| {
+        let bytes =
+            (config.frames_from == FramesFrom::Timestamp || config.sensors.is_some()).then(|| std::fs::read(file(camera, position)?).ok());
+        imaging::probe(&bytes??).ok()?.exif.time_secs
+    };
+    let exposures: Vec<Exposure> = places
+        .iter()
+        .map(|&(camera, position)| {
+            let stem = file(camera, position)
+                .and_then(|f| f.file_stem())
+                .map_or_else(|| format!("{position:06}"), |s| s.to_string_lossy().into_owned());
+            Exposure { camera, position, stem, time_secs: time(camera, position) }
+        })
+        .collect();
+    let names: Vec<&str> = config.cameras.iter().map(|c| c.name.as_str()).collect();
+    let (numbers, notes) = pair_up(&names, &exposures, config.frames_from);
+    warnings.extend(notes);
+    let entry = |((exposure, number), image): ((&Exposure, u32), &scene::Image)| {
+        let camera = exposure.camera;
+        let file_name = file(camera, exposure.position).and_then(|f| f.file_name()).map(|n| n.to_string_lossy().into_owned());
+        let name = file_name.map_or_else(|| image.name.clone(), |n| format!("{}/{n}", names[camera]));
+        let ((width, height), content) = (size(camera), Fingerprint::of_bytes(&[]));
+        let (stem, position, time_secs) = (exposure.stem.clone(), Some(exposure.position), exposure.time_secs);
+        ImageEntry { name, camera, stem, position, exposure: number, time_secs, width, height, content }
+    };
+    let entries =
+        names.iter().enumerate().map(|(c, name)| CameraEntry { name: (*name).to_owned(), size: Some(size(c)), exif_focal_px: None });
+    let images: Vec<ImageEntry> = exposures.iter().zip(numbers).zip(&model.images).map(entry).collect();
+    ImageList { cameras: entries.collect(), found: images.len(), images }
+}
+
+/// The model with a frame for each image, cameras in the order of dive.toml, and beside them its rig where it has one of all of them.
+fn flat(model: &Reconstruction, list: &ImageList, cameras: &[CameraId]) -> Reconstruction {
+    let mut rigs: Vec<Rig> = (0..cameras.len()).map(|c| Rig::single(CameraId::new(c))).collect();
+    let whole = model.rigs.iter().find_map(|rig| cameras.iter().map(|&c| rig.cam_from_rig(c)).collect::<Option<Vec<Rigid3>>>());
+    let are_different = cameras.iter().collect::<BTreeSet<_>>().len() == cameras.len();
+    if let Some(poses) = whole.filter(|_| are_different && cameras.len() > 1) {
+        let rig_from_first = poses[0].inverse();
+        let sensor = |(c, pose): (usize, &Rigid3)| RigSensor { camera: CameraId::new(c), cam_from_rig: *pose * rig_from_first };
+        rigs.push(Rig { sensors: poses.iter().enumerate().map(sensor).collect() });
+    }
+    let frames = list.images.iter().enumerate().map(|(i, entry)| Frame {
+        rig: RigId::new(entry.camera),
+        exposure: entry.exposure,
+        rig_from_world: model.cam_from_world(scene::ImageId::new(i)),
+    });
+    let image = |(i, entry): (usize, &ImageEntry)| scene::Image {
+        name: entry.name.clone(),
+        camera: CameraId::new(entry.camera),
+        frame: FrameId::new(i),
+    };
+    Reconstruction {
+        cameras: cameras.iter().map(|c| model.cameras[c.index()]).collect(),
+        rigs,
+        frames: frames.collect(),
+        images: list.images.iter().enumerate().map(image).collect(),
+        keypoints: model.keypoints.clone(),
+        points: model.points.clone(),
+        scale: model.scale,
+    }
+}
