@@ -71,7 +71,8 @@ fn the_examples_of_the_page_are_accepted() {
         .iter()
         .map(|(key, _)| *key)
         .filter(|key| {
-            let name = key.rsplit('.').next().unwrap_or(key);
+            // A name that the user chooses stands for its table.
+            let name = key.trim_end_matches(".*").rsplit('.').next().unwrap_or(key);
             !all.lines().any(|line| line.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name))
         })
         .collect();

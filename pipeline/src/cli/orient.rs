@@ -6,7 +6,7 @@ use super::summary::summary;
 use crate::config;
 use crate::stages::adopt::readjust;
 use anyhow::{Context, Result, bail};
-use scene::format::{read_colmap_binary, write_colmap_binary};
+use scene::format::read_colmap_binary;
 use serde_json::json;
 
 pub(super) fn orient(args: &OrientArgs) -> Result<()> {
@@ -18,8 +18,11 @@ pub(super) fn orient(args: &OrientArgs) -> Result<()> {
         bail!("{} is not empty: give another folder with --out, or empty it", out.display());
     }
     let done = readjust(&config, &model)?;
-    std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
-    write_colmap_binary(&done.model, &out).with_context(|| out.display().to_string())?;
+    for (name, bytes) in &done.files {
+        let path = out.join(name);
+        let written = path.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(&path, bytes));
+        written.with_context(|| path.display().to_string())?;
+    }
     for warning in &done.warnings {
         eprintln!("warning: {}: {}", warning.about, warning.message);
     }

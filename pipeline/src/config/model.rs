@@ -191,7 +191,7 @@ pub struct SensorsConfig {
     pub file: PathBuf,
     /// Time in the log at the time 0 of the images, seconds.
     pub offset_secs: f64,
-    /// Time between exposures, for images that do not tell theirs, seconds.
+    /// Time between the files of a camera, for images that do not tell theirs, seconds.
     pub interval_secs: Option<f64>,
     /// How much later than it was measured a position stands in the log, seconds.
     pub position_latency_secs: f64,

@@ -2,11 +2,13 @@
 
 use super::images::{CameraEntry, ImageEntry, ImageList};
 use super::interior::{self, Origin, Start};
+use super::model;
 use super::orient::{Found, assemble, options_of};
-use super::orient_figures::figures;
+use super::orient_figures::{figures, precision_table};
 use super::pairing::{Exposure, pair_up};
 use crate::config::{Config, FramesFrom, ImageSource};
 use crate::error::{Misfit, NoResult};
+use crate::formats::write_calibration;
 use crate::store::{Fingerprint, Warning};
 use anyhow::Result;
 use mapping::MapError;
@@ -17,8 +19,8 @@ use std::path::Path;
 
 /// A model after its adjustment, and what is told of it.
 pub struct Readjusted {
-    /// The model.
-    pub model: Reconstruction,
+    /// Its files, by name: as in `sparse` and `calib` of a run.
+    pub files: Vec<(String, Vec<u8>)>,
     /// Figures as in report.json.
     pub figures: Value,
     /// What a user should know.
@@ -30,20 +32,20 @@ pub struct Readjusted {
 ///
 /// # Errors
 /// When the model does not belong to the images of dive.toml, or nothing of it is left.
-pub fn readjust(config: &Config, model: &Reconstruction) -> Result<Readjusted> {
+pub fn readjust(config: &Config, given: &Reconstruction) -> Result<Readjusted> {
     let mut warnings = Vec::new();
-    let places = model.images.iter().map(|image| place_of(config, &image.name)).collect::<Result<Vec<_>>>()?;
-    let cameras = cameras_of(config, model, &places)?;
-    let list = image_list(config, model, &places, &cameras, &mut warnings);
-    let start = flat(model, &list, &cameras);
-    let (given, notes) = interior::starts(config, &list)?;
+    let places = given.images.iter().map(|image| place_of(config, &image.name)).collect::<Result<Vec<_>>>()?;
+    let cameras = cameras_of(config, given, &places)?;
+    let list = image_list(config, given, &places, &cameras, &mut warnings);
+    let start = flat(given, &list, &cameras);
+    let (stated, notes) = interior::starts(config, &list)?;
     warnings.extend(notes);
-    let starts: Vec<Start> = given.into_iter().zip(&start.cameras).map(|(given, &camera)| adopted(given, camera)).collect();
-    let mut colours: Vec<Vec<[u8; 3]>> = model.keypoints.iter().map(|k| vec![[128; 3]; k.len()]).collect();
-    for point in &model.points {
+    let starts: Vec<Start> = stated.into_iter().zip(&start.cameras).map(|(stated, &camera)| adopted(stated, camera)).collect();
+    let mut colours: Vec<Vec<[u8; 3]>> = given.keypoints.iter().map(|k| vec![[128; 3]; k.len()]).collect();
+    for point in &given.points {
         point.track.iter().for_each(|o| colours[o.image.index()][o.keypoint.index()] = point.colour);
     }
-    let found = Found { keypoints: model.keypoints.clone(), sigmas_px: vec![Vec::new(); model.images.len()], colours, pairs: Vec::new() };
+    let found = Found { keypoints: given.keypoints.clone(), sigmas_px: vec![Vec::new(); given.images.len()], colours, pairs: Vec::new() };
     let input = assemble(config, &list, &starts, found, &mut warnings)?;
     let orientation = match mapping::readjust(&input, &start, &options_of(config)) {
         Ok(orientation) => orientation,
@@ -54,8 +56,15 @@ pub fn readjust(config: &Config, model: &Reconstruction) -> Result<Readjusted> {
     let mut figures = figures(config, &list, &starts, &orientation, &orientation.models[0]);
     let told: Vec<Value> = warnings.iter().map(|w| json!({"about": w.about, "message": w.message})).collect();
     figures["warnings"] = told.into();
-    let model = orientation.models.into_iter().next().ok_or_else(|| NoResult("nothing is left of the model".to_owned()))?;
-    Ok(Readjusted { model, figures, warnings })
+    let (model, quality) = (&orientation.models[0], orientation.summary.quality.as_ref().ok());
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    files.extend(model::files(model, quality.map_or(&[], |q| &q.points))?.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)));
+    files.extend(quality.map(|q| ("precision.csv".to_owned(), precision_table(model, q).into_bytes())));
+    let calibrations = model.cameras.iter().zip(&list.cameras);
+    files.extend(
+        calibrations.map(|(camera, entry)| (model::calibration_file(&entry.name), write_calibration(camera, &entry.name).into_bytes())),
+    );
+    Ok(Readjusted { files, figures, warnings })
 }
 
 /// The model's interior orientation, where dive.toml gives none.
@@ -126,8 +135,11 @@ fn image_list(
         ImageSource::Files(files) => files.get(position),
         ImageSource::Video { .. } => None,
     };
-    // Only this rule needs to open the files.
-    let time = |camera, position| {
+    let time = |camera: usize, position: usize| {
+        if let ImageSource::Video { rate_hz, .. } = config.cameras[camera].images {
+            return Some(position as f64 / rate_hz);
+        }
+        // Nothing else needs the files themselves.
         let bytes =
             (config.frames_from == FramesFrom::Timestamp || config.sensors.is_some()).then(|| std::fs::read(file(camera, position)?).ok());
         imaging::probe(&bytes??).ok()?.exif.time_secs
@@ -149,7 +161,8 @@ fn image_list(
         let file_name = file(camera, exposure.position).and_then(|f| f.file_name()).map(|n| n.to_string_lossy().into_owned());
         let name = file_name.map_or_else(|| image.name.clone(), |n| format!("{}/{n}", names[camera]));
         let ((width, height), content) = (size(camera), Fingerprint::of_bytes(&[]));
-        let (stem, position, time_secs) = (exposure.stem.clone(), Some(exposure.position), exposure.time_secs);
+        let (stem, time_secs) = (exposure.stem.clone(), exposure.time_secs);
+        let position = file(camera, exposure.position).map(|_| exposure.position);
         ImageEntry { name, camera, stem, position, exposure: number, time_secs, width, height, content }
     };
     let entries =

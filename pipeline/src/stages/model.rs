@@ -39,7 +39,7 @@ pub fn load(work: &Work<'_>) -> Result<Reconstruction> {
     Ok(model)
 }
 
-fn calibration_file(camera: &str) -> String {
+pub(super) fn calibration_file(camera: &str) -> String {
     format!("calib/{camera}.toml")
 }
 
@@ -73,12 +73,23 @@ fn without_shear(model: &Reconstruction) -> Option<Reconstruction> {
 
 type Writer = fn(&ColmapModel<'_>, &mut dyn Write) -> std::io::Result<()>;
 
-/// Writes a model and its points as a cloud below a folder; `sigmas` of the points, or none. The shear of a camera of Brown's model is left
-/// out: COLMAP's models have none.
+/// Writes the files of a model below a folder.
 ///
 /// # Errors
-/// When COLMAP cannot hold the model, or a file cannot be written.
+/// As [`files`], and when a file cannot be written.
 pub fn save(work: &Work<'_>, model: &Reconstruction, sigmas: &[Option<f64>], folder: &str) -> Result<()> {
+    for (name, bytes) in files(model, sigmas)? {
+        work.files.save(&format!("{folder}/{name}"), Fingerprint::of_bytes(&bytes), &bytes)?;
+    }
+    Ok(())
+}
+
+/// A model as COLMAP's files and its points as a cloud, by name; `sigmas` of the points, or none. The shear of a camera of Brown's model is
+/// left out: COLMAP's models have none.
+///
+/// # Errors
+/// When COLMAP cannot hold the model.
+pub fn files(model: &Reconstruction, sigmas: &[Option<f64>]) -> Result<Vec<(&'static str, Vec<u8>)>> {
     let sheared = without_shear(model);
     let colmap = ColmapModel::new(sheared.as_ref().unwrap_or(model))?;
     let writers: [Writer; 5] = [
@@ -88,10 +99,11 @@ pub fn save(work: &Work<'_>, model: &Reconstruction, sigmas: &[Option<f64>], fol
         |m, out| m.write_images_binary(out),
         |m, out| m.write_points_binary(out),
     ];
-    for (name, write) in FILES.iter().zip(writers) {
+    let mut files = Vec::with_capacity(FILES.len() + 1);
+    for (&name, write) in FILES.iter().zip(writers) {
         let mut bytes = Vec::new();
         write(&colmap, &mut bytes)?;
-        work.files.save(&format!("{folder}/{name}"), Fingerprint::of_bytes(&bytes), &bytes)?;
+        files.push((name, bytes));
     }
     let cloud = Cloud {
         positions: model.points.iter().map(|p| p.xyz.into()).collect(),
@@ -102,6 +114,6 @@ pub fn save(work: &Work<'_>, model: &Reconstruction, sigmas: &[Option<f64>], fol
     };
     let mut bytes = Vec::new();
     write_ply_cloud(&cloud, &mut bytes)?;
-    work.files.save(&format!("{folder}/points.ply"), Fingerprint::of_bytes(&bytes), &bytes)?;
-    Ok(())
+    files.push(("points.ply", bytes));
+    Ok(files)
 }

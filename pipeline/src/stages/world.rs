@@ -55,12 +55,16 @@ pub(super) fn world(config: &Config, list: &ImageList, warnings: &mut Vec<Warnin
 
 /// Picks in images that are there; the others are warnings.
 pub(super) fn picks(picks: &[PickConfig], about: &str, list: &ImageList, warnings: &mut Vec<Warning>) -> Vec<ImagePick> {
-    let mut found = Vec::with_capacity(picks.len());
+    let (mut found, mut missing) = (Vec::with_capacity(picks.len()), Vec::new());
     for pick in picks {
         match list.images.iter().position(|i| i.name == pick.image) {
             Some(i) => found.push(ImagePick { image: ImageId::new(i), pixel: [pick.x, pick.y] }),
-            None => warnings.push(Warning { about: about.to_owned(), message: format!("there is no usable image {}", pick.image) }),
+            None => missing.push(pick.image.as_str()),
         }
+    }
+    if !missing.is_empty() {
+        let message = format!("{} of {} picks are not used: there is no usable image {}", missing.len(), picks.len(), missing.join(", "));
+        warnings.push(Warning { about: about.to_owned(), message });
     }
     found
 }
@@ -69,11 +73,10 @@ pub(super) fn picks(picks: &[PickConfig], about: &str, list: &ImageList, warning
 fn instants(sensors: &SensorsConfig, list: &ImageList) -> Result<Vec<(u32, f64)>> {
     let mut times: BTreeMap<u32, f64> = BTreeMap::new();
     for image in &list.images {
-        let time = match sensors.interval_secs {
-            Some(interval) => Some(f64::from(image.exposure) * interval),
-            None => image.time_secs,
-        };
-        if let Some(time) = time {
+        // Files are counted, not exposures: one that cannot be read leaves a gap in time.
+        let counted = sensors.interval_secs.zip(image.position).map(|(interval, position)| position as f64 * interval);
+        if let Some(time) = counted.or(image.time_secs) {
+            // The first camera that took part tells the time.
             times.entry(image.exposure).or_insert(time + sensors.offset_secs);
         }
     }
