@@ -34,13 +34,29 @@ pub(crate) fn note(model: &Model, options: &OrientOptions) -> Option<String> {
     if against.len() > NAMED {
         list.push("...".into());
     }
-    Some(format!(
-        "{} of {} matched pairs of images contradict the model: {}. Either these matches are wrong, or two places that look alike were \
-         taken for one",
-        against.len(),
-        tested.len(),
-        list.join(", ")
-    ))
+    let cause = match suspects(model, &tested, &against) {
+        Some(cameras) => format!(
+            "Most pairs within a camera fit, most between {cameras} do not: the interior orientation of one of them, or their place in the rig, is wrong"
+        ),
+        None => "Either these matches are wrong, or two places that look alike were taken for one".to_owned(),
+    };
+    Some(format!("{} of {} matched pairs of images contradict the model: {}. {cause}", against.len(), tested.len(), list.join(", ")))
+}
+
+/// The two cameras between which most pairs contradict the model, where few of those within each of them do.
+fn suspects(model: &Model, tested: &[&VerifiedPair], against: &[&VerifiedPair]) -> Option<String> {
+    let cameras = |pair: &VerifiedPair| {
+        let [a, b] = [pair.images.0, pair.images.1].map(|i| model.images[i.index()].camera.index());
+        (a.min(b), a.max(b))
+    };
+    let (p, q) = against.iter().map(|pair| cameras(pair)).find(|(p, q)| p != q)?;
+    let share = |wanted: &[(usize, usize)]| {
+        let count = |pairs: &[&VerifiedPair]| pairs.iter().filter(|pair| wanted.contains(&cameras(pair))).count() as f64;
+        count(against) / count(tested).max(1.0)
+    };
+    let name = |c: usize| model.input.cameras[c].name.as_str();
+    let (across, within) = (share(&[(p, q)]), share(&[(p, p), (q, q)]));
+    (across > 0.5 && across > 3.0 * within).then(|| format!("{} and {}", name(p), name(q)))
 }
 
 fn contradicts(model: &Model, pair: &VerifiedPair, options: &OrientOptions) -> bool {

@@ -23,6 +23,8 @@ pub struct SurveyOptions {
     pub baseline_m: f64,
     /// Way of the rig from one exposure to the next, metres; it flies 3 m above the sea bed.
     pub step_m: f64,
+    /// How much lower the rig is from one exposure to the next, metres: motion along the optical axis.
+    pub descent_m: f64,
     /// Interior orientation of all cameras.
     pub camera: Camera,
     /// Standard deviation of keypoint positions, pixels.
@@ -54,6 +56,7 @@ impl Default for SurveyOptions {
             points: 2000,
             baseline_m: 0.5,
             step_m: 0.6,
+            descent_m: 0.0,
             camera,
             noise_px: 0.0,
             outlier_share: 0.0,
@@ -139,7 +142,8 @@ fn cam_from_rig(options: &SurveyOptions, camera: usize) -> Rigid3 {
 /// Along x with a gentle bend, looking down and a little ahead, with the unrest of a vehicle. World: z up.
 fn rig_from_world(options: &SurveyOptions, exposure: usize, random: &mut Random) -> Rigid3 {
     let along = options.step_m * exposure as f64;
-    let centre = Vector3::new(along, 0.5 * (along * 0.3).sin(), 3.0 + 0.2 * (along * 0.7).cos());
+    let height = 3.0 + 0.2 * (along * 0.7).cos() - options.descent_m * exposure as f64;
+    let centre = Vector3::new(along, 0.5 * (along * 0.3).sin(), height);
     // Columns: x right (-y of the world), y backwards, z down.
     let down = Matrix3::new(0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
     let tilt = Rotation3::from_euler_angles(0.25 + 0.05 * random.normal(), 0.05 * random.normal(), 0.1 * random.normal());

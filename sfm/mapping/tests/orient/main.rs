@@ -3,6 +3,7 @@
 mod determinism;
 mod edges;
 mod exact;
+mod failures;
 mod global;
 mod lengths;
 mod quality;
