@@ -110,6 +110,15 @@ fn a_rendered_dive_comes_out_as_it_is() {
     let (code, message) = dive.fails(&["orient", "--from", "wrong", "--out", "no"]);
     assert!(code == 2 && message.contains("image C9/1.png of the model is none of dive.toml"), "{message}");
 
+    // Every form of a model; its cameras have one focal length and two radial terms.
+    for (format, file) in [("colmap-text", "points3D.txt"), ("nerfstudio", "transforms.json"), ("bundler", "bundle.out")] {
+        dive.ok(&["export", "out/sparse", "--format", format, "--out", format]);
+        assert!(std::fs::read_to_string(dive.path(format).join(file)).unwrap().len() > 1000, "{format}");
+        assert!(dive.fails(&["export", "out/sparse", "--format", format, "--out", format]).1.contains("is not empty"));
+    }
+    let transforms: Value = serde_json::from_slice(&std::fs::read(dive.path("nerfstudio/transforms.json")).unwrap()).unwrap();
+    assert_eq!(transforms["frames"].as_array().map(Vec::len), Some(12));
+
     // Nothing is left to do; a changed option of one stage leaves those before it done.
     let stages =
         |text: String| -> Vec<String> { text.lines().map(|l| l.split_whitespace().take(2).collect::<Vec<_>>().join(" ")).collect() };

@@ -36,6 +36,8 @@ pub enum Command {
     Eval(EvalArgs),
     /// Adjust a model that another program made with the rig, lengths, sensors and control points of a dive.toml.
     Orient(OrientArgs),
+    /// Write a model in the form of another program.
+    Export(ExportArgs),
     /// Adjust a bundle problem as it is: a file of "Bundle Adjustment in the Large" or a COLMAP model.
     Bundle(BundleArgs),
     /// Explain a command; `sfm help json` explains the keys of report.json.
@@ -217,6 +219,30 @@ pub struct OrientArgs {
     /// Print the figures as JSON, with the keys of report.json.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `sfm export`.
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// Folder of the binary COLMAP model: `sparse` in the output of a run.
+    pub model: PathBuf,
+    /// The form.
+    #[arg(long, value_enum)]
+    pub format: ExportFormat,
+    /// Folder to write, new or empty.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
+}
+
+/// Form of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormat {
+    /// COLMAP's text files.
+    ColmapText,
+    /// transforms.json: cameras for nerfstudio and what follows it.
+    Nerfstudio,
+    /// bundle.out and list.txt; cameras of one focal length and two radial terms only.
+    Bundler,
 }
 
 /// Arguments of `sfm bundle`.

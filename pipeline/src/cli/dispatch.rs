@@ -1,7 +1,7 @@
 //! From the command line to an exit code.
 
 use super::args::{Cli, Command};
-use super::{bundle, eval, help, init, orient, run, status, synth};
+use super::{bundle, eval, export, help, init, orient, run, status, synth};
 use crate::config::ConfigError;
 use crate::error::{Misfit, NoResult};
 use crate::synth::SynthError;
@@ -27,6 +27,7 @@ pub fn main() -> ExitCode {
         Command::Eval(args) => eval::eval(args),
         Command::Bundle(args) => bundle::bundle(args),
         Command::Orient(args) => orient::orient(args),
+        Command::Export(args) => export::export(args),
         Command::Help(args) => help::help(args),
     };
     match result {

@@ -4,6 +4,7 @@ mod args;
 mod bundle;
 mod dispatch;
 mod eval;
+mod export;
 mod help;
 mod init;
 mod keys;

@@ -1,15 +1,21 @@
-//! File formats: COLMAP models, PLY clouds and meshes, OBJ meshes.
+//! File formats: COLMAP models, nerfstudio and Bundler files, PLY clouds and meshes, OBJ meshes.
 //!
 //! Readers trust nothing: every count is checked against what is left of the file before memory is taken for it, and a
 //! broken file gives a [`FormatError`] that says where. Writers give the same bytes for the same value.
 
+mod bundler;
 mod bytes;
 pub mod colmap;
 mod error;
+mod nerfstudio;
 mod obj;
 pub mod ply;
+#[cfg(test)]
+mod testing;
 
+pub use bundler::write_bundler;
 pub use colmap::{ColmapModel, read_colmap_binary, write_colmap_binary, write_colmap_text};
 pub use error::FormatError;
+pub use nerfstudio::write_nerfstudio;
 pub use obj::read_obj_mesh;
 pub use ply::{Dropped, read_ply_cloud, read_ply_mesh, write_ply_cloud, write_ply_mesh};
