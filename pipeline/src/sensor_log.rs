@@ -172,6 +172,20 @@ mod tests {
         assert!(parse(b"time,depth_m\n0,1\n").unwrap_err().to_string().contains("no column time_s"));
     }
 
+    proptest::proptest! {
+        /// Whatever the file holds, it is read or refused.
+        #[test]
+        fn nothing_panics(text in "(time_s|depth_m|roll_deg|[0-9.,\"\\n# -]|nan|1e999){0,60}", bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..200)) {
+            let _ = parse(&bytes);
+            let _ = parse(text.as_bytes());
+            if let Ok(log) = parse(format!("time_s,depth_m,roll_deg,pitch_deg\n{text}").as_bytes()) {
+                proptest::prop_assert!(log.depths.is_sorted_by(|a, b| a.0 <= b.0));
+                at_instants(&log.depths, &[0.0, 1.0, 2.5]);
+                at_instants(&log.ups, &[0.0, 1.0, 2.5]);
+            }
+        }
+    }
+
     #[test]
     fn frequent_readings_are_interpolated_and_rare_ones_go_to_the_nearest_instant() {
         let instants = [0.0, 1.0, 2.0, 3.0, 10.0];

@@ -111,8 +111,14 @@ fn a_rendered_dive_comes_out_as_it_is() {
     assert!(code == 2 && message.contains("image C9/1.png of the model is none of dive.toml"), "{message}");
 
     // Every form of a model; its cameras have one focal length and two radial terms.
-    for (format, file) in [("colmap-text", "points3D.txt"), ("nerfstudio", "transforms.json"), ("bundler", "bundle.out")] {
-        dive.ok(&["export", "out/sparse", "--format", format, "--out", format]);
+    let forms = [
+        ("out/sparse", "colmap-text", "points3D.txt"),
+        ("out/sparse", "nerfstudio", "transforms.json"),
+        // Text is read as well.
+        ("colmap-text", "bundler", "bundle.out"),
+    ];
+    for (from, format, file) in forms {
+        dive.ok(&["export", from, "--format", format, "--out", format]);
         assert!(std::fs::read_to_string(dive.path(format).join(file)).unwrap().len() > 1000, "{format}");
         assert!(dive.fails(&["export", "out/sparse", "--format", format, "--out", format]).1.contains("is not empty"));
     }

@@ -207,7 +207,7 @@ pub struct OrientArgs {
     /// The configuration: its cameras name the images of the model.
     #[arg(default_value = "dive.toml")]
     pub dive: PathBuf,
-    /// Folder of the binary COLMAP model.
+    /// Folder of the COLMAP model, binary or text.
     #[arg(long, value_name = "MODEL")]
     pub from: PathBuf,
     /// Folder for the adjusted model, new or empty [default: adjusted, in the output folder].
@@ -224,7 +224,7 @@ pub struct OrientArgs {
 /// Arguments of `sfm export`.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// Folder of the binary COLMAP model: `sparse` in the output of a run.
+    /// Folder of the COLMAP model, binary or text: `sparse` in the output of a run.
     pub model: PathBuf,
     /// The form.
     #[arg(long, value_enum)]
@@ -248,7 +248,7 @@ pub enum ExportFormat {
 /// Arguments of `sfm bundle`.
 #[derive(Debug, Args)]
 pub struct BundleArgs {
-    /// A text file of Bundle Adjustment in the Large, or the folder of a binary COLMAP model.
+    /// A text file of Bundle Adjustment in the Large, or the folder of a COLMAP model.
     pub problem: PathBuf,
     /// Largest number of steps.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=100_000))]

@@ -6,7 +6,7 @@ use crate::clock::{Timing, Watch};
 use anyhow::{Context, Result};
 use nalgebra::Vector2;
 use scene::camera::{MAX_CAMERA_PARAMS, ParamKind};
-use scene::format::read_colmap_binary;
+use scene::format::read_colmap_model;
 use scene::{ImageId, Reconstruction};
 use serde_json::json;
 use solve::adjust::{AdjustOptions, AdjustSummary, CameraBlock, ImageObservation, PointBlock, PoseBlock, Problem, adjust};
@@ -16,7 +16,7 @@ pub(super) fn bundle(args: &BundleArgs) -> Result<()> {
     start_threads(args.threads)?;
     let name = || args.problem.display().to_string();
     let mut problem = if args.problem.is_dir() {
-        problem_of(&read_colmap_binary(&args.problem)?).with_context(name)?
+        problem_of(&read_colmap_model(&args.problem)?).with_context(name)?
     } else {
         parse_bal(&std::fs::read_to_string(&args.problem).with_context(name)?).with_context(name)?
     };

@@ -2,12 +2,12 @@
 
 use super::args::{ExportArgs, ExportFormat};
 use anyhow::{Context, Result, bail};
-use scene::format::{read_colmap_binary, write_bundler, write_colmap_text, write_nerfstudio};
+use scene::format::{read_colmap_model, write_bundler, write_colmap_text, write_nerfstudio};
 use std::path::Path;
 
 pub(super) fn export(args: &ExportArgs) -> Result<()> {
     let named = |path: &Path| path.display().to_string();
-    let model = read_colmap_binary(&args.model).with_context(|| named(&args.model))?;
+    let model = read_colmap_model(&args.model).with_context(|| named(&args.model))?;
     if std::fs::read_dir(&args.out).is_ok_and(|mut files| files.next().is_some()) {
         bail!("{} is not empty: give another folder, or empty it", args.out.display());
     }

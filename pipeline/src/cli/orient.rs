@@ -6,13 +6,13 @@ use super::summary::summary;
 use crate::config;
 use crate::stages::adopt::readjust;
 use anyhow::{Context, Result, bail};
-use scene::format::read_colmap_binary;
+use scene::format::read_colmap_model;
 use serde_json::json;
 
 pub(super) fn orient(args: &OrientArgs) -> Result<()> {
     start_threads(args.threads)?;
     let config = config::read(&args.dive)?;
-    let model = read_colmap_binary(&args.from).with_context(|| args.from.display().to_string())?;
+    let model = read_colmap_model(&args.from).with_context(|| args.from.display().to_string())?;
     let out = args.out.clone().unwrap_or_else(|| config.output.join("adjusted"));
     if std::fs::read_dir(&out).is_ok_and(|mut files| files.next().is_some()) {
         bail!("{} is not empty: give another folder with --out, or empty it", out.display());

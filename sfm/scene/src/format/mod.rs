@@ -14,7 +14,7 @@ pub mod ply;
 mod testing;
 
 pub use bundler::write_bundler;
-pub use colmap::{ColmapModel, read_colmap_binary, write_colmap_binary, write_colmap_text};
+pub use colmap::{ColmapModel, read_colmap_binary, read_colmap_model, read_colmap_text, write_colmap_binary, write_colmap_text};
 pub use error::FormatError;
 pub use nerfstudio::write_nerfstudio;
 pub use obj::read_obj_mesh;

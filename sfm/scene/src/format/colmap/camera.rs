@@ -25,6 +25,11 @@ pub(super) fn model_from_id(id: i32) -> Option<ColmapCameraModel> {
     READABLE.into_iter().find(|m| m.id == id)
 }
 
+/// The model of a name that COLMAP uses, where we can read it.
+pub(super) fn model_from_name(name: &str) -> Option<ColmapCameraModel> {
+    READABLE.into_iter().find(|m| m.name == name)
+}
+
 /// Our camera as COLMAP's; `None` for Brown's model with shear (C2), which COLMAP cannot express.
 ///
 /// All models but Brown's are the same function. Brown's affinity C1 adds c C1 u to x, whereas two focal lengths also

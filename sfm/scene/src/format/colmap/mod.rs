@@ -8,6 +8,7 @@
 mod camera;
 mod model;
 mod read;
+mod read_text;
 #[cfg(test)]
 mod tests;
 mod write_binary;
@@ -15,6 +16,7 @@ mod write_text;
 
 pub use model::ColmapModel;
 pub use read::{ColmapFiles, read_colmap, read_colmap_binary};
+pub use read_text::{read_colmap_model, read_colmap_text};
 
 use super::FormatError;
 use crate::Reconstruction;

@@ -269,3 +269,64 @@ fn colmap_reads_the_same_model() {
         assert!((back.reprojection_rms() - scene.reprojection_rms()).abs() < 1e-9);
     }
 }
+
+/// A folder with the sample as text.
+fn text_folder() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a folder");
+    write_colmap_text(&sample(), dir.path()).expect("valid");
+    dir
+}
+
+#[test]
+fn text_is_read_as_the_binary_form() {
+    let (text, binary) = (text_folder(), tempfile::tempdir().expect("a folder"));
+    write_colmap_binary(&sample(), binary.path()).expect("valid");
+    let expected = read_colmap_binary(binary.path()).expect("valid");
+    assert_eq!(read_colmap_text(text.path()).expect("valid"), expected);
+    assert_eq!(read_colmap_model(text.path()).expect("valid"), expected);
+    assert_eq!(read_colmap_model(binary.path()).expect("valid"), expected);
+    // Without rigs and frames, every image by itself.
+    for file in ["rigs.txt", "frames.txt"] {
+        std::fs::remove_file(text.path().join(file)).expect("it is there");
+    }
+    let single = read_colmap_text(text.path()).expect("valid");
+    assert_eq!((single.rigs.len(), single.frames.len()), (single.cameras.len(), single.images.len()));
+}
+
+/// File, what is replaced in it, by what, and the message.
+#[test]
+fn a_broken_line_is_named() {
+    for (file, from, to, message) in [
+        ("cameras.txt", " RADIAL", " MAGIC", "cameras.txt, line 3: camera model MAGIC is not supported"),
+        ("cameras.txt", " 640 480", " 640 wide", "cameras.txt, line 3: HEIGHT is \"wide\", which it cannot be"),
+        ("cameras.txt", " 0.02\n", "\n", "cameras.txt, line 3: ends before PARAMS"),
+        ("cameras.txt", " 0.02\n", " 0.02 7\n", "cameras.txt, line 3: \"7\" is one field too many"),
+        ("cameras.txt", " 0.02\n", " inf\n", "cameras.txt, line 3: camera 1:"),
+        ("rigs.txt", "CAMERA 2", "IMU 2", "rigs.txt, line 3: sensors of type IMU are not supported"),
+        ("frames.txt", "\n1 1 ", "\n1 9 ", "frames.txt, line 3: rig 9 does not exist"),
+        ("images.txt", "c0/000.jpg\n", "c0/000.jpg\n1.5 ", "images.txt, line 5: "),
+        ("points3D.txt", "\n1 ", "\nnan ", "points3D.txt, line 3: POINT3D_ID is \"nan\""),
+    ] {
+        let dir = text_folder();
+        let path = dir.path().join(file);
+        let text = std::fs::read_to_string(&path).expect("text");
+        assert!(text.contains(from), "{file} has no {from:?}:\n{text}");
+        std::fs::write(&path, text.replacen(from, to, 1)).expect("written");
+        let found = read_colmap_text(dir.path()).expect_err("broken").to_string();
+        assert!(found.contains(message), "{found}, expected {message}");
+    }
+}
+
+proptest! {
+    /// Text that is cut, or has a byte replaced, is read or refused.
+    #[test]
+    fn damaged_text_never_panics(file in 0usize..5, at in 0.0..1.0f64, byte in "[ -~\n]", cut in any::<bool>()) {
+        let dir = text_folder();
+        let path = dir.path().join(["cameras.txt", "rigs.txt", "frames.txt", "images.txt", "points3D.txt"][file]);
+        let mut text = std::fs::read(&path).expect("text");
+        let at = (at * text.len() as f64) as usize;
+        if cut { text.truncate(at) } else { text[at] = byte.as_bytes()[0] }
+        std::fs::write(&path, text).expect("written");
+        let _ = read_colmap_text(dir.path());
+    }
+}
