@@ -98,6 +98,14 @@ impl Known {
         self.bars.iter().map(|bar| bar.given).collect()
     }
 
+    /// Puts picked points where the poses as they are now see them.
+    pub(crate) fn update_picked(&mut self, model: &Model) {
+        for bar in &mut self.bars {
+            bar.start = bar_ends(model, &model.input.scale_bars[bar.given]).unwrap_or(bar.start);
+        }
+        self.ties.update_picked(model);
+    }
+
     /// Takes a length out of the adjustment.
     pub(crate) fn without(&self, which: LengthId) -> Self {
         let mut rest = self.clone();

@@ -60,6 +60,13 @@ impl Ties {
         self.places
     }
 
+    /// Puts control points where the poses as they are now see them.
+    pub(crate) fn update_picked(&mut self, model: &Model) {
+        for (given, start) in &mut self.control {
+            *start = triangulated(model, &model.input.world.control_points[*given].picks).unwrap_or(*start);
+        }
+    }
+
     /// Adds the observations to an adjustment.
     pub(crate) fn add_to(&self, problem: &mut Problem, model: &Model, map: &ProblemMap) {
         let frames = frame_of_exposure(model);
