@@ -5,9 +5,10 @@ use super::{bundle, eval, export, help, init, orient, run, status, synth};
 use crate::config::ConfigError;
 use crate::error::{Misfit, NoResult};
 use crate::synth::SynthError;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Parser;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Wrong command line or dive.toml; clap uses the same.
@@ -63,6 +64,14 @@ pub(super) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes())?;
     Ok(out.flush()?)
+}
+
+/// Refuses to write among files that are there already.
+pub(super) fn require_empty(folder: &Path) -> anyhow::Result<()> {
+    if std::fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some()) {
+        bail!("{} is not empty: give another folder with --out, or empty it", folder.display());
+    }
+    Ok(())
 }
 
 /// Starts the threads that all work is shared among.

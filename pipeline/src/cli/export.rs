@@ -1,16 +1,15 @@
 //! `sfm export`.
 
 use super::args::{ExportArgs, ExportFormat};
-use anyhow::{Context, Result, bail};
+use super::dispatch::require_empty;
+use anyhow::{Context, Result};
 use scene::format::{read_colmap_model, write_bundler, write_colmap_text, write_nerfstudio};
 use std::path::Path;
 
 pub(super) fn export(args: &ExportArgs) -> Result<()> {
     let named = |path: &Path| path.display().to_string();
     let model = read_colmap_model(&args.model).with_context(|| named(&args.model))?;
-    if std::fs::read_dir(&args.out).is_ok_and(|mut files| files.next().is_some()) {
-        bail!("{} is not empty: give another folder, or empty it", args.out.display());
-    }
+    require_empty(&args.out)?;
     // Whole in memory first: a model that has no form in the format leaves no file.
     let mut files: Vec<(&str, Vec<u8>)> = Vec::new();
     match args.format {

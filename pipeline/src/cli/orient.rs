@@ -1,11 +1,11 @@
 //! `sfm orient`.
 
 use super::args::OrientArgs;
-use super::dispatch::{print, start_threads};
+use super::dispatch::{print, require_empty, start_threads};
 use super::summary::summary;
 use crate::config;
 use crate::stages::adopt::readjust;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use scene::format::read_colmap_model;
 use serde_json::json;
 
@@ -14,9 +14,7 @@ pub(super) fn orient(args: &OrientArgs) -> Result<()> {
     let config = config::read(&args.dive)?;
     let model = read_colmap_model(&args.from).with_context(|| args.from.display().to_string())?;
     let out = args.out.clone().unwrap_or_else(|| config.output.join("adjusted"));
-    if std::fs::read_dir(&out).is_ok_and(|mut files| files.next().is_some()) {
-        bail!("{} is not empty: give another folder with --out, or empty it", out.display());
-    }
+    require_empty(&out)?;
     let done = readjust(&config, &model)?;
     for (name, bytes) in &done.files {
         let path = out.join(name);

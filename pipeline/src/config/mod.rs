@@ -24,4 +24,5 @@ pub use keys::KEYS;
 pub use model::*;
 pub(crate) use resolve::is_safe_name;
 pub use resolve::{parse, read};
+pub(crate) use sensors::MAX_FROM_ORIGIN_M;
 pub use stage_options::*;

@@ -12,7 +12,7 @@ use toml::Spanned;
 /// Standard deviation of a control point of which none is given, metres.
 const DEFAULT_CONTROL_SIGMA_M: f64 = 0.01;
 /// Farther from the origin of the world a point cloud of single precision no longer tells millimetres.
-const MAX_FROM_ORIGIN_M: f64 = 10_000.0;
+pub(crate) const MAX_FROM_ORIGIN_M: f64 = 10_000.0;
 
 /// Where the origin of the model's frame lies in the world of the sensors and control points.
 pub(super) fn origin(source: &mut Source<'_>, raw: &RawWorld) -> [f64; 3] {

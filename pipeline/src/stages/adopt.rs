@@ -15,7 +15,7 @@ use mapping::MapError;
 use scene::{CameraId, Frame, FrameId, Reconstruction, Rig, RigId, RigSensor, Rigid3};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::ffi::OsStr;
 
 /// A model after its adjustment, and what is told of it.
 pub struct Readjusted {
@@ -83,8 +83,7 @@ fn place_of(config: &Config, name: &str) -> Result<(usize, usize)> {
         let of_camera = name.strip_prefix(&camera.name).and_then(|rest| rest.strip_prefix('/'));
         match &camera.images {
             ImageSource::Files(files) => {
-                let file_of = |p: &Path| p.file_name().map(|n| n.to_string_lossy().into_owned());
-                if let Some(p) = of_camera.and_then(|file| files.iter().position(|p| file_of(p).as_deref() == Some(file))) {
+                if let Some(p) = of_camera.and_then(|file| files.iter().position(|p| p.file_name() == Some(OsStr::new(file)))) {
                     return Ok((c, p));
                 }
                 ends.extend(files.iter().position(|p| p.ends_with(name)).map(|p| (c, p)));
@@ -115,10 +114,12 @@ fn cameras_of(config: &Config, model: &Reconstruction, places: &[(usize, usize)]
     for (image, &(camera, _)) in model.images.iter().zip(places) {
         used[camera].insert(image.camera);
     }
-    let one = |(camera, used): (&crate::config::CameraConfig, &BTreeSet<CameraId>)| match used.len() {
-        1 => Ok(*used.first().expect("one")),
-        0 => Err(Misfit(format!("the model has no image of camera {}: leave it out of dive.toml", camera.name)).into()),
-        n => Err(Misfit(format!("the model has {n} interior orientations for images of camera {}, which has one", camera.name)).into()),
+    let one = |(camera, used): (&crate::config::CameraConfig, &BTreeSet<CameraId>)| match (used.first(), used.len()) {
+        (Some(&only), 1) => Ok(only),
+        (None, _) => Err(Misfit(format!("the model has no image of camera {}: leave it out of dive.toml", camera.name)).into()),
+        (_, n) => {
+            Err(Misfit(format!("the model has {n} interior orientations for images of camera {}, which has one", camera.name)).into())
+        }
     };
     config.cameras.iter().zip(&used).map(one).collect()
 }

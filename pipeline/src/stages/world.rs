@@ -1,7 +1,7 @@
 //! What the vehicle's sensors and control points say of the world.
 
 use super::images::ImageList;
-use crate::config::{Config, PickConfig, SensorsConfig};
+use crate::config::{Config, MAX_FROM_ORIGIN_M, PickConfig, SensorsConfig};
 use crate::error::Misfit;
 use crate::sensor_log::{SensorLog, at_instants, read_sensor_log};
 use crate::store::Warning;
@@ -10,9 +10,6 @@ use mapping::{ControlPointInput, HeadingInput, ImagePick, PositionInput, UpInput
 use nalgebra::Vector3;
 use scene::ImageId;
 use std::collections::BTreeMap;
-
-/// Farther from the origin a point cloud of single precision no longer tells millimetres.
-const MAX_FROM_ORIGIN_M: f64 = 10_000.0;
 
 /// Reads the log and brings it to the exposures.
 ///

@@ -4,7 +4,6 @@ use crate::adjustment::{ProblemMap, sensor_of, whole_problem};
 use crate::lengths::{Known, LengthId};
 use crate::model::Model;
 use crate::options::OrientOptions;
-use crate::ties::Fixed;
 use nalgebra::{Matrix3, Matrix3x6};
 use scene::{ImageId, Scale};
 use solve::adjust::{AdjustSummary, Baseline, Covariance, CovarianceError, ImageObservation, Loss, Problem, covariance};
@@ -85,7 +84,7 @@ pub(crate) fn quality(
     let found = covariance(&problem, &Loss::Trivial)?;
     let datum = model.frame_images.iter().enumerate().find(|(f, _)| places.frame(*f) == Some(held));
     let datum = datum.and_then(|(_, images)| images.first().copied()).unwrap_or(ImageId(0));
-    let datum_in_world = if known.ties.fixes == Fixed::ALL {
+    let datum_in_world = if known.ties.fix_world {
         problem.frames[held as usize].free = true;
         let found = covariance(&problem, &Loss::Trivial)?;
         pose_sigma(model, datum, &problem, &places, &found)

@@ -13,51 +13,24 @@ use std::collections::BTreeMap;
 /// A unit that is known worse than this, as a share of it, is none.
 const MAX_SCALE_SIGMA: f64 = 0.05;
 
-/// Which observations of the world take part in an adjustment, and what of the world they fix.
+/// Which observations of the world take part in an adjustment.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ties {
     /// Directions and headings take part.
-    attitude: bool,
+    pub attitude: bool,
     /// Positions take part, and the control points below.
-    places: bool,
+    pub places: bool,
     /// Position in the input and start of each control point that takes part.
     control: Vec<(usize, Vector3<f64>)>,
-    pub fixes: Fixed,
+    /// They fix the whole pose of the world: which way is up and north, and where its origin is.
+    pub fix_world: bool,
     /// What a user should know.
     pub notes: Vec<String>,
-}
-
-/// What of the pose of the world is observed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Fixed {
-    /// Which way is up.
-    pub tilt: bool,
-    /// Which way is north.
-    pub heading: bool,
-    /// East and north of the origin.
-    pub horizontal: bool,
-    /// Its height.
-    pub height: bool,
-}
-
-impl Fixed {
-    /// Everything.
-    pub(crate) const ALL: Self = Self { tilt: true, heading: true, horizontal: true, height: true };
 }
 
 impl Ties {
     pub(crate) fn is_empty(&self) -> bool {
         !self.attitude && !self.places
-    }
-
-    /// Whether directions and headings take part.
-    pub(crate) fn attitude(&self) -> bool {
-        self.attitude
-    }
-
-    /// Whether positions and control points take part.
-    pub(crate) fn places(&self) -> bool {
-        self.places
     }
 
     /// Puts control points where the poses as they are now see them.
@@ -154,9 +127,8 @@ fn taken(model: &mut Model, attitude: &Attitude, places: &[Place], found: &Place
         notes.push("which way is north cannot be told: there is no heading, and the positions are too near each other".to_owned());
     }
     move_world(model, &motion);
-    let fixes = Fixed { tilt: true, heading, horizontal: metric && is_known(0) && is_known(1), height: metric && is_known(2) };
-    let has_attitude = !attitude.ups.is_empty() || !attitude.headings.is_empty();
-    Ties { attitude: has_attitude, places: metric && !places.is_empty(), control: Vec::new(), fixes, notes }
+    let fix_world = metric && heading && (0..3).all(is_known);
+    Ties { attitude: !attitude.is_empty(), places: metric && !places.is_empty(), control: Vec::new(), fix_world, notes }
 }
 
 /// What instruments tell of directions, in the model.

@@ -86,7 +86,7 @@ pub(crate) fn report_world(model: &Model, ties: &Ties) -> Option<WorldReport> {
     let pose = |exposure: u32| -> Option<Rigid3> { model.frames[frames.get(&exposure)?.index()].rig_from_world };
     let (mut horizontal, mut height, mut tilt, mut heading) = (Sums::default(), Sums::default(), Sums::default(), Sums::default());
     let world = &model.input.world;
-    for o in world.positions.iter().filter(|_| ties.places()) {
+    for o in world.positions.iter().filter(|_| ties.places) {
         let Some(pose) = pose(o.exposure) else { continue };
         let v = pose.inverse().apply(&o.in_rig) - o.xyz;
         let known = |axes: std::ops::Range<usize>| axes.map(|k| (v[k], o.sigma_m[k])).filter(|(_, s)| s.is_finite()).collect::<Vec<_>>();
@@ -96,14 +96,14 @@ pub(crate) fn report_world(model: &Model, ties: &Ties) -> Option<WorldReport> {
             }
         }
     }
-    for o in world.ups.iter().filter(|_| ties.attitude()) {
+    for o in world.ups.iter().filter(|_| ties.attitude) {
         let Some(pose) = pose(o.exposure) else { continue };
         let off = (pose.rotation * Vector3::z()).cross(&o.up_in_rig.normalize());
         // Two components that are alike share the angle.
         let each = off.norm().asin() / 2f64.sqrt();
         tilt.add(&[(each, o.sigma_rad), (each, o.sigma_rad)]);
     }
-    for o in world.headings.iter().filter(|_| ties.attitude()) {
+    for o in world.headings.iter().filter(|_| ties.attitude) {
         let Some(pose) = pose(o.exposure) else { continue };
         let axis = pose.rotation.inverse() * o.axis_in_rig;
         let off = axis.x.atan2(axis.y) - o.heading_rad;
