@@ -11,10 +11,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("eval", &["scene"]),
     ("synthetic", &["scene", "imaging"]),
     ("features", &["scene", "imaging", "solve"]),
-    ("masking", &["scene", "imaging"]),
+    ("models", &[]),
+    ("masking", &["scene", "imaging", "models"]),
     ("mapping", &["scene", "solve"]),
     ("dense", &["scene", "imaging"]),
-    ("pipeline", &["scene", "imaging", "solve", "eval", "synthetic", "features", "masking", "mapping", "dense"]),
+    ("pipeline", &["scene", "imaging", "solve", "eval", "synthetic", "features", "models", "masking", "mapping", "dense"]),
 ];
 
 #[test]
