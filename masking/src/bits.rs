@@ -104,6 +104,15 @@ impl BitMask {
         self.row_mut(y)[x / 64] |= 1 << (x % 64);
     }
 
+    /// Takes pixel (x, y) out.
+    ///
+    /// # Panics
+    /// Outside of the image.
+    pub fn clear(&mut self, x: usize, y: usize) {
+        assert!(x < self.width, "column {x} of {}", self.width);
+        self.row_mut(y)[x / 64] &= !(1 << (x % 64));
+    }
+
     /// Number of set pixels.
     #[must_use]
     pub fn count(&self) -> usize {

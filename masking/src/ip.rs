@@ -38,6 +38,8 @@ pub struct IpOptions {
     pub min_structure_area: f64,
     /// Holes of less than this share of the image are filled.
     pub min_hole_area: f64,
+    /// The threshold in place of Otsu's, a grey value: that of a whole dive, from [`histogram`]s of its images.
+    pub threshold: Option<u8>,
     /// Which side of Otsu's threshold is structure.
     pub polarity: Polarity,
     /// A connected part of either side of Otsu's threshold is structure altogether where at least this share of it is textured.
@@ -58,6 +60,7 @@ impl Default for IpOptions {
             closing_radius: 0.012,
             min_structure_area: 0.004,
             min_hole_area: 0.002,
+            threshold: None,
             polarity: Polarity::Auto,
             min_textured_share: 0.35,
             reach: 0.03,
@@ -96,11 +99,7 @@ pub struct IpMask {
 #[must_use]
 pub fn ip_mask(rgb: &Raster<[u8; 3]>, options: &IpOptions) -> IpMask {
     let (width, height) = (rgb.width(), rgb.height());
-    let long_side = width.max(height);
-    let factor = if options.working_long_side_px == 0 { 1 } else { long_side.div_ceil(options.working_long_side_px) };
-    let factor = factor.clamp(1, MAX_FACTOR.min(width.min(height)).max(1));
-    let passes = (options.blur_sigma_px * options.blur_sigma_px).round().clamp(0.0, 100.0) as usize;
-    let plane = smooth(&reduced_channel(rgb, options.channel.min(2), factor), passes);
+    let (plane, factor) = working_plane(rgb, options);
     if plane.data().is_empty() {
         return IpMask { mask: Raster::filled(width, height, 0), threshold: 0, side: None, empty: true, edge_share: 0.0 };
     }
@@ -114,13 +113,13 @@ pub fn ip_mask(rgb: &Raster<[u8; 3]>, options: &IpOptions) -> IpMask {
     // By their area with what they enclose: the outline of a smooth body is thin.
     let bodies = remove_specks(&fill_holes(&closed, usize::MAX), area(options.min_structure_area));
     let texture = closed.and(&bodies);
-    let split = otsu(&histogram(&plane));
+    let split = options.threshold.or_else(|| otsu(&counts(&plane)).map(|s| s.threshold));
     let is_water = (bodies.count() as f64) < options.min_texture * pixels;
     let (mut structure, mut side) = (BitMask::new(plane.width(), plane.height()), None);
-    if let Some(split) = &split
+    if let Some(threshold) = split
         && !is_water
     {
-        let dark = BitMask::from_test(plane.width(), plane.height(), plane.data(), |v| grey(v) <= usize::from(split.threshold));
+        let dark = BitMask::from_test(plane.width(), plane.height(), plane.data(), |v| grey(v) <= usize::from(threshold));
         let bright = dark.not();
         let structured = structured_side(&dark, &bright, &texture, options.polarity);
         structure = with_sides(&texture, &dark, &bright, structured, length(options.reach), options.min_textured_share);
@@ -132,7 +131,7 @@ pub fn ip_mask(rgb: &Raster<[u8; 3]>, options: &IpOptions) -> IpMask {
     IpMask {
         empty: structure.count() == 0,
         mask: structure.to_mask(width, height, factor),
-        threshold: split.map_or(0, |s| s.threshold),
+        threshold: split.unwrap_or(0),
         side,
         edge_share: edges.count() as f64 / pixels,
     }
@@ -163,7 +162,22 @@ fn with_sides(texture: &BitMask, dark: &BitMask, bright: &BitMask, side: Polarit
     out
 }
 
-fn histogram(plane: &Plane) -> [u64; 256] {
+/// The channel that is split, smoothed, and by how much it is reduced.
+fn working_plane(rgb: &Raster<[u8; 3]>, options: &IpOptions) -> (Plane, usize) {
+    let long_side = rgb.width().max(rgb.height());
+    let factor = if options.working_long_side_px == 0 { 1 } else { long_side.div_ceil(options.working_long_side_px) };
+    let factor = factor.clamp(1, MAX_FACTOR.min(rgb.width().min(rgb.height())).max(1));
+    let passes = (options.blur_sigma_px * options.blur_sigma_px).round().clamp(0.0, 100.0) as usize;
+    (smooth(&reduced_channel(rgb, options.channel.min(2), factor), passes), factor)
+}
+
+/// How often each grey value occurs in the smoothed channel that [`ip_mask`] splits. Those of all images of a dive, summed, give its threshold by [`otsu`].
+#[must_use]
+pub fn histogram(rgb: &Raster<[u8; 3]>, options: &IpOptions) -> [u64; 256] {
+    counts(&working_plane(rgb, options).0)
+}
+
+fn counts(plane: &Plane) -> [u64; 256] {
     // Four interleaved counts: neighbouring pixels are mostly equal, and one counter would wait for itself.
     let mut counts = [[0u32; 256]; 4];
     for pixels in plane.data().chunks(4) {
@@ -325,6 +339,7 @@ mod tests {
                 closing_radius: v.min(0.5),
                 min_structure_area: v,
                 min_hole_area: v,
+                threshold: Some(0),
                 polarity: Polarity::Auto,
                 min_textured_share: v,
                 reach: v.min(0.5),

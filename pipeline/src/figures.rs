@@ -25,7 +25,7 @@ pub fn report(config: &Config, done: &BTreeMap<&'static str, Stamp>) -> Value {
         "images": {"found": figure("ingest", "found"), "total": figure("ingest", "usable"), "oriented": figure("orient", "oriented")},
         "frames": {"total": figure("ingest", "frames")},
         "cameras": cameras(figure("ingest", "cameras"), &figure("orient", "cameras")),
-        "masks": part("mask", &["strategy", "masks", "empty", "masked_ratio"]),
+        "masks": part("mask", &["strategy", "masks", "empty", "empty_images", "masked_ratio", "masked_ratio_by_camera", "classifier"]),
         "features": part("features", &["keypoints", "median"]),
         "matching": part("matching", &["pairs_tried", "pairs_verified", "matches", "calibrated", "uncalibrated", "planar_or_panoramic"]),
         "points": figure("orient", "points"),

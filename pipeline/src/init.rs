@@ -194,6 +194,8 @@ pub fn dive_toml(found: &Found) -> String {
         let _ = writeln!(text, "\n# The distance between two cameras makes the model metric.\n# [[rig.baseline]]");
         let _ = writeln!(text, "# between = [\"{}\", \"{}\"]\n# length_m = 0.3\n# sigma_m = 0.001", first.name, second.name);
     }
-    text.push_str("\n[mask]\nstrategy = \"none\"  # \"files\" reads masks, \"ip\" makes them by image processing\n");
+    text.push_str(
+        "\n[mask]\nstrategy = \"none\"  # \"files\" reads masks, \"ip\" makes them by image processing, \"ml\" by a classifier\n",
+    );
     text
 }

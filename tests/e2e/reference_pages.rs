@@ -42,6 +42,8 @@ fn the_examples_of_the_page_are_accepted() {
         "frames/right/0002.jpg",
         "port.mp4",
         "reference.ply",
+        "models/mine.onnx",
+        "libonnxruntime.so",
         "positions.txt",
         "sensors.csv",
     ] {

@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+use crate::config::MaskStrategy;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -32,6 +33,12 @@ pub enum Command {
     /// Render a dive whose truth is known: frames, dive.toml, truth.
     #[command(override_usage = "sfm synth [OPTIONS] [SCENE.toml] <FOLDER>")]
     Synth(SynthArgs),
+    /// Write the masks of a dive by one strategy or several, to be compared.
+    Mask(MaskArgs),
+    /// Propose masks for the images that the classifier is least sure of, to be corrected and trained with.
+    Label(LabelArgs),
+    /// Train the classifier of masks with labelled images.
+    Train(TrainArgs),
     /// Measure a cloud against a reference in the same frame.
     Eval(EvalArgs),
     /// Adjust a model that another program made with the rig, lengths, sensors and control points of a dive.toml.
@@ -173,6 +180,81 @@ pub enum Port {
     None,
 }
 
+/// Arguments of `sfm mask`.
+#[derive(Debug, Args)]
+pub struct MaskArgs {
+    /// The configuration.
+    #[arg(default_value = "dive.toml")]
+    pub dive: PathBuf,
+    /// none, files, ip, ml or ip+ml, several with commas [default: that of the configuration].
+    #[arg(long, value_name = "STRATEGIES", value_delimiter = ',', value_parser = mask_strategy)]
+    pub strategy: Vec<MaskStrategy>,
+    /// Folder for the masks, new or empty [default: masks-compared, in the output folder].
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Write preview.jpg as well: images beside their masks.
+    #[arg(long)]
+    pub preview: bool,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print the figures as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sfm label`.
+#[derive(Debug, Args)]
+pub struct LabelArgs {
+    /// The configuration.
+    #[arg(default_value = "dive.toml")]
+    pub dive: PathBuf,
+    /// How many images to propose.
+    #[arg(long, value_name = "N", num_args = 0..=1, default_value_t = 20, default_missing_value = "20", value_parser = clap::value_parser!(u32).range(1..))]
+    pub suggest: u32,
+    /// Folder for images and masks, new or empty.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+/// Arguments of `sfm train`.
+#[derive(Debug, Args)]
+pub struct TrainArgs {
+    /// Folders of images with masks or polygons (docs/masks.md tells how they lie).
+    #[arg(value_name = "LABELS", required = true)]
+    pub labels: Vec<PathBuf>,
+    /// The model to write, .onnx; its card lies beside it.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Network with the feature maps s8, s16 and s32 that the head is set on [default: that of the model that comes with sfm].
+    #[arg(long, value_name = "FILE")]
+    pub backbone: Option<PathBuf>,
+    /// A label of polygons that is structure; may be given again [default: all but water, background, fish, diver and the like].
+    #[arg(long, value_name = "LABEL")]
+    pub structure: Vec<String>,
+    /// What the model is for, for the card [default: what it was made from].
+    #[arg(long, value_name = "TEXT")]
+    pub description: Option<String>,
+    /// Licence, for the card.
+    #[arg(long, value_name = "LICENCE")]
+    pub licence: Option<String>,
+    /// Which images are held out, which patches are taken.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// The ONNX Runtime library [default: found].
+    #[arg(long, value_name = "FILE")]
+    pub onnxruntime: Option<PathBuf>,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print the figures as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Arguments of `sfm eval`.
 #[derive(Debug, Args)]
 pub struct EvalArgs {
@@ -271,6 +353,11 @@ pub struct HelpArgs {
 fn stage_name(text: &str) -> Result<String, String> {
     let names: Vec<&str> = crate::recipe::RECIPE.iter().map(|s| s.name).collect();
     if names.contains(&text) { Ok(text.to_owned()) } else { Err(format!("the stages are {}", names.join(", "))) }
+}
+
+fn mask_strategy(text: &str) -> Result<MaskStrategy, String> {
+    let found = MaskStrategy::ALL.iter().find(|(name, _)| *name == text);
+    found.map(|(_, strategy)| *strategy).ok_or_else(|| "the strategies are none, files, ip, ml, ip+ml".to_owned())
 }
 
 fn image_size(text: &str) -> Result<(u32, u32), String> {

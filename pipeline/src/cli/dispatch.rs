@@ -1,7 +1,7 @@
 //! From the command line to an exit code.
 
 use super::args::{Cli, Command};
-use super::{bundle, eval, export, help, init, orient, run, status, synth};
+use super::{bundle, eval, export, help, init, label, mask, orient, run, status, synth, train};
 use crate::config::ConfigError;
 use crate::error::{Misfit, NoResult};
 use crate::synth::SynthError;
@@ -25,6 +25,9 @@ pub fn main() -> ExitCode {
         Command::Status(args) => status::status(args),
         Command::Init(args) => init::init(args),
         Command::Synth(args) => synth::synth(args),
+        Command::Mask(args) => mask::mask(args),
+        Command::Label(args) => label::label(args),
+        Command::Train(args) => train::run(args),
         Command::Eval(args) => eval::eval(args),
         Command::Bundle(args) => bundle::bundle(args),
         Command::Orient(args) => orient::orient(args),

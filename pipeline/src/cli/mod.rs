@@ -8,12 +8,15 @@ mod export;
 mod help;
 mod init;
 mod keys;
+mod label;
+mod mask;
 mod orient;
 mod run;
 mod status;
 mod summary;
 mod synth;
 mod terminal;
+mod train;
 
 pub use args::Cli;
 pub use dispatch::main;

@@ -173,6 +173,16 @@ pub(super) struct RawMask {
     pub(super) min_textured_share: Place<f64>,
     pub(super) reach: Place<f64>,
     pub(super) min_texture: Place<f64>,
+    pub(super) otsu: Place<String>,
+    pub(super) min_structure_m2: Place<f64>,
+    pub(super) min_hole_m2: Place<f64>,
+    pub(super) gsd_m: Place<f64>,
+    pub(super) preprocessing: Place<String>,
+    pub(super) model: Place<PathText>,
+    pub(super) onnxruntime: Place<PathText>,
+    pub(super) route: Place<String>,
+    pub(super) levels: Place<u32>,
+    pub(super) combine: Place<String>,
 }
 
 #[derive(Debug, Default, Deserialize)]

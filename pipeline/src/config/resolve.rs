@@ -106,7 +106,7 @@ fn resolve(source: &mut Source<'_>, raw: &RawConfig, file: &Path) -> Config {
         origin_m,
         sensors,
         control_points,
-        mask: stages::mask(source, &raw.mask, &cameras),
+        mask: stages::mask(source, &raw.mask, &cameras, folder),
         features: stages::features(source, &raw.features),
         matching: stages::matching(source, &raw.matching),
         orient: stages::orient(source, &raw.orient),

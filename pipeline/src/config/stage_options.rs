@@ -13,9 +13,30 @@ pub enum MaskStrategy {
     Files,
     /// Masks are made by image processing.
     Ip,
+    /// Masks are made by a classifier.
+    Ml,
+    /// Both, combined.
+    #[serde(rename = "ip+ml")]
+    IpMl,
 }
 
 impl MaskStrategy {
+    /// All, by name.
+    pub const ALL: [(&'static str, Self); 5] =
+        [("none", Self::None), ("files", Self::Files), ("ip", Self::Ip), ("ml", Self::Ml), ("ip+ml", Self::IpMl)];
+
+    /// Whether image processing takes part.
+    #[must_use]
+    pub fn has_ip(self) -> bool {
+        matches!(self, Self::Ip | Self::IpMl)
+    }
+
+    /// Whether a classifier takes part.
+    #[must_use]
+    pub fn has_ml(self) -> bool {
+        matches!(self, Self::Ml | Self::IpMl)
+    }
+
     /// The name in dive.toml and in `out/masks/<strategy>`.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -23,6 +44,8 @@ impl MaskStrategy {
             Self::None => "none",
             Self::Files => "files",
             Self::Ip => "ip",
+            Self::Ml => "ml",
+            Self::IpMl => "ip+ml",
         }
     }
 }
@@ -32,8 +55,102 @@ impl MaskStrategy {
 pub struct MaskConfig {
     /// How masks are made.
     pub strategy: MaskStrategy,
+    /// What is done with images before they are masked.
+    pub preprocessing: Preprocessing,
+    /// How small a part of the image may be.
+    pub areas: AreaConfig,
     /// Options of the strategy `ip`.
     pub ip: IpConfig,
+    /// Options of the strategy `ml`.
+    pub ml: MlConfig,
+    /// What the masks of `ip+ml` are.
+    pub combine: Combine,
+}
+
+/// What is done with images before they are masked, see `masking::Preprocessing`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preprocessing {
+    /// Nothing.
+    None,
+    /// Equalisation of the channels.
+    Equalise,
+    /// Equalisation by tiles.
+    Clahe,
+    /// Correction of colour in l alpha beta.
+    Lab,
+    /// Ratio to the surroundings.
+    Retinex,
+}
+
+/// What two masks are together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Combine {
+    /// Structure in both.
+    And,
+    /// Structure in either.
+    Or,
+}
+
+/// Areas below which structure is removed and holes are filled.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AreaConfig {
+    /// Of structure, share of the image.
+    pub min_structure_area: f64,
+    /// Of holes, share of the image.
+    pub min_hole_area: f64,
+    /// Of structure, square metres, in place of the share; needs `gsd_m`.
+    pub min_structure_m2: Option<f64>,
+    /// Of holes, square metres, in place of the share; needs `gsd_m`.
+    pub min_hole_m2: Option<f64>,
+    /// What a pixel shows at the distance of the structure, metres.
+    pub gsd_m: Option<f64>,
+}
+
+impl AreaConfig {
+    /// The least areas of structure and holes as shares of an image.
+    #[must_use]
+    pub fn shares(&self, width: usize, height: usize) -> (f64, f64) {
+        let image_m2 = self.gsd_m.map(|gsd| gsd * gsd * (width * height).max(1) as f64);
+        let share = |share: f64, m2: Option<f64>| m2.zip(image_m2).map_or(share, |(m2, image)| (m2 / image).min(1.0));
+        (share(self.min_structure_area, self.min_structure_m2), share(self.min_hole_area, self.min_hole_m2))
+    }
+}
+
+/// How patches get their logits, see `masking::Route`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Route {
+    /// The network runs once over the whole image.
+    Shared,
+    /// The network runs for every patch.
+    Patches,
+}
+
+/// Options of masks by a classifier, see `masking::MlOptions`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MlConfig {
+    /// The model, ONNX; that of the program where none is named.
+    #[serde(skip)]
+    pub model: Option<PathBuf>,
+    /// The ONNX Runtime library; found where none is named.
+    #[serde(skip)]
+    pub onnxruntime: Option<PathBuf>,
+    /// How patches get their logits.
+    pub route: Route,
+    /// Depth of the quadtree.
+    pub levels: u32,
+}
+
+/// What Otsu's threshold is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OtsuOf {
+    /// Each image.
+    Image,
+    /// All images of a camera together: the light on a dive is the same for all of them, but each camera has its own exposure.
+    Dive,
 }
 
 /// Which side of the threshold is structure.
@@ -65,16 +182,14 @@ pub struct IpConfig {
     pub canny_high: f64,
     /// Radius of the closing, share of the long side.
     pub closing_radius: f64,
-    /// Smaller structures go, share of the image.
-    pub min_structure_area: f64,
-    /// Smaller holes are filled, share of the image.
-    pub min_hole_area: f64,
     /// Texture that makes a part structure, share of the part.
     pub min_textured_share: f64,
     /// How far structure reaches from texture, share of the long side.
     pub reach: f64,
     /// Less texture is water alone, share of the image.
     pub min_texture: f64,
+    /// What the threshold is of.
+    pub otsu: OtsuOf,
 }
 
 /// How distinctive points are found and matched.

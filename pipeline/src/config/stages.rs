@@ -5,27 +5,77 @@ use super::model::CameraConfig;
 use super::path_text::PathText;
 use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport};
 use super::stage_options::{
-    DenseQuality, DensifyConfig, EvaluateConfig, FeatureMethod, FeaturesConfig, IpConfig, Mapper, MaskConfig, MaskStrategy, MatchingConfig,
-    OrientConfig, PairRule, Polarity, ReportConfig,
+    AreaConfig, Combine, DenseQuality, DensifyConfig, EvaluateConfig, FeatureMethod, FeaturesConfig, IpConfig, Mapper, MaskConfig,
+    MaskStrategy, MatchingConfig, MlConfig, OrientConfig, OtsuOf, PairRule, Polarity, Preprocessing, ReportConfig, Route,
 };
 use super::values::Values;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::Spanned;
 
 /// Full HD and less: what so few pixels show is worth the time, and their finer keypoints are twice as precise.
 const DOUBLE_UP_TO_MPX: f64 = 2.1;
 
-pub(super) fn mask(source: &mut Source<'_>, raw: &RawMask, cameras: &[CameraConfig]) -> MaskConfig {
+pub(super) fn mask(source: &mut Source<'_>, raw: &RawMask, cameras: &[CameraConfig], folder: &Path) -> MaskConfig {
+    let model = existing_file(source, "mask.model", &raw.model, folder);
+    let onnxruntime = existing_file(source, "mask.onnxruntime", &raw.onnxruntime, folder);
     let mut values = Values { source };
-    let strategies = [("none", MaskStrategy::None), ("files", MaskStrategy::Files), ("ip", MaskStrategy::Ip)];
     let any_file = cameras.iter().any(|c| c.mask.is_some());
     let default = if any_file { MaskStrategy::Files } else { MaskStrategy::None };
-    let strategy = values.choice("mask.strategy", &raw.strategy, &strategies).unwrap_or(default);
+    let strategy = values.choice("mask.strategy", &raw.strategy, &MaskStrategy::ALL).unwrap_or(default);
     if let (MaskStrategy::Files, false, Some(place)) = (strategy, any_file, &raw.strategy) {
         let hint = "add `mask = \"masks/{stem}.png\"` to a [[camera]]";
         values.problem_with_hint(place.span(), "mask.strategy", "no camera names its mask files", hint);
     }
-    MaskConfig { strategy, ip: ip(&mut values, raw) }
+    let corrections = [
+        ("none", Preprocessing::None),
+        ("equalise", Preprocessing::Equalise),
+        ("clahe", Preprocessing::Clahe),
+        ("lab", Preprocessing::Lab),
+        ("retinex", Preprocessing::Retinex),
+    ];
+    let routes = [("shared", Route::Shared), ("patches", Route::Patches)];
+    let default = masking::MlOptions::default();
+    MaskConfig {
+        strategy,
+        preprocessing: values.choice("mask.preprocessing", &raw.preprocessing, &corrections).unwrap_or(Preprocessing::None),
+        areas: areas(&mut values, raw),
+        ip: ip(&mut values, raw),
+        ml: MlConfig {
+            model,
+            onnxruntime,
+            route: values.choice("mask.route", &raw.route, &routes).unwrap_or(Route::Shared),
+            levels: values.count("mask.levels", &raw.levels, 0, masking::MAX_LEVELS as u32, default.levels as u32),
+        },
+        combine: values.choice("mask.combine", &raw.combine, &[("and", Combine::And), ("or", Combine::Or)]).unwrap_or(Combine::And),
+    }
+}
+
+fn areas(values: &mut Values<'_, '_>, raw: &RawMask) -> AreaConfig {
+    let default = masking::IpOptions::default();
+    let found = AreaConfig {
+        min_structure_area: values.within("mask.min_structure_area", &raw.min_structure_area, 0.0, 1.0, default.min_structure_area),
+        min_hole_area: values.within("mask.min_hole_area", &raw.min_hole_area, 0.0, 1.0, default.min_hole_area),
+        min_structure_m2: values.positive("mask.min_structure_m2", &raw.min_structure_m2),
+        min_hole_m2: values.positive("mask.min_hole_m2", &raw.min_hole_m2),
+        gsd_m: values.positive("mask.gsd_m", &raw.gsd_m),
+    };
+    for (key, place) in [("mask.min_structure_m2", &raw.min_structure_m2), ("mask.min_hole_m2", &raw.min_hole_m2)] {
+        if let (Some(place), None) = (place, &raw.gsd_m) {
+            let hint = "add gsd_m, what a pixel shows at the distance of the structure, in metres";
+            values.problem_with_hint(place.span(), key, "cannot be told in pixels", hint);
+        }
+    }
+    found
+}
+
+/// A file that dive.toml names, relative to its folder; a problem where there is none.
+fn existing_file(source: &mut Source<'_>, key: &str, place: &Option<Spanned<PathText>>, folder: &Path) -> Option<PathBuf> {
+    let place = place.as_ref()?;
+    let path = folder.join(place.get_ref().as_str());
+    if !path.is_file() {
+        source.problem(Some(place.span()), key, format!("there is no file {}", path.display()), None);
+    }
+    Some(path)
 }
 
 fn ip(values: &mut Values<'_, '_>, raw: &RawMask) -> IpConfig {
@@ -34,8 +84,6 @@ fn ip(values: &mut Values<'_, '_>, raw: &RawMask) -> IpConfig {
     let channels = [("red", 0), ("green", 1), ("blue", 2)];
     let mut share = |key: &str, value, default| values.within(key, value, 0.0, 1.0, default);
     let closing_radius = share("mask.closing_radius", &raw.closing_radius, default.closing_radius);
-    let min_structure_area = share("mask.min_structure_area", &raw.min_structure_area, default.min_structure_area);
-    let min_hole_area = share("mask.min_hole_area", &raw.min_hole_area, default.min_hole_area);
     let min_textured_share = share("mask.min_textured_share", &raw.min_textured_share, default.min_textured_share);
     let reach = share("mask.reach", &raw.reach, default.reach);
     let min_texture = share("mask.min_texture", &raw.min_texture, default.min_texture);
@@ -58,11 +106,10 @@ fn ip(values: &mut Values<'_, '_>, raw: &RawMask) -> IpConfig {
         canny_low,
         canny_high,
         closing_radius,
-        min_structure_area,
-        min_hole_area,
         min_textured_share,
         reach,
         min_texture,
+        otsu: values.choice("mask.otsu", &raw.otsu, &[("image", OtsuOf::Image), ("dive", OtsuOf::Dive)]).unwrap_or(OtsuOf::Image),
     }
 }
 
@@ -139,16 +186,8 @@ pub(super) fn densify(source: &mut Source<'_>, raw: &RawDensify) -> DensifyConfi
 }
 
 pub(super) fn evaluate(source: &mut Source<'_>, raw: &RawEvaluate, folder: &Path) -> EvaluateConfig {
-    let mut file = |key: &str, place: &Option<Spanned<PathText>>| {
-        let place = place.as_ref()?;
-        let path = folder.join(place.get_ref().as_str());
-        if !path.is_file() {
-            source.problem(Some(place.span()), key, format!("there is no file {}", path.display()), None);
-        }
-        Some(path)
-    };
-    let reference = file("evaluate.reference", &raw.reference);
-    let positions = file("evaluate.positions", &raw.positions);
+    let reference = existing_file(source, "evaluate.reference", &raw.reference, folder);
+    let positions = existing_file(source, "evaluate.positions", &raw.positions, folder);
     let mut values = Values { source };
     EvaluateConfig {
         reference,

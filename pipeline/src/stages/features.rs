@@ -85,6 +85,11 @@ fn one_image(work: &Work<'_>, list: &ImageList, image: &ImageEntry) -> Result<(u
         ("image", image.content.as_bytes().as_slice()),
         ("mask", mask::content(work, list, image).as_bytes().as_slice()),
     ]);
+    if mask::is_empty(work, image) {
+        // Nothing but water, as the figures of the masks list it.
+        work.files.item::<anyhow::Error>(&path, key, || Ok(write_features(&StoredFeatures::default())))?;
+        return Ok((0, None));
+    }
     let mut damage = None;
     if !work.files.reuse(&path, key) {
         let stored = match decode(&list.bytes(work, image)?) {

@@ -1,6 +1,6 @@
 //! The list of images that `ingest` makes and every later stage reads.
 
-use crate::config::ImageSource;
+use crate::config::{Config, ImageSource};
 use crate::stage::Work;
 use crate::store::Fingerprint;
 use anyhow::{Context, Result, bail};
@@ -71,7 +71,23 @@ impl ImageList {
         let Some(position) = image.position else {
             return Ok(work.read("ingest", &frame_file(&self.cameras[image.camera].name, &image.stem))?);
         };
-        let ImageSource::Files(files) = &work.config.cameras[image.camera].images else { bail!("{} is no file", image.name) };
+        self.file_bytes(work.config, image, position)
+    }
+
+    /// As [`ImageList::bytes`], without a stage.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn bytes_in(&self, config: &Config, image: &ImageEntry) -> Result<Vec<u8>> {
+        let Some(position) = image.position else {
+            let file = config.output.join(frame_file(&self.cameras[image.camera].name, &image.stem));
+            return std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()));
+        };
+        self.file_bytes(config, image, position)
+    }
+
+    fn file_bytes(&self, config: &Config, image: &ImageEntry, position: usize) -> Result<Vec<u8>> {
+        let ImageSource::Files(files) = &config.cameras[image.camera].images else { bail!("{} is no file", image.name) };
         let bytes = std::fs::read(&files[position]).with_context(|| format!("cannot read {}", files[position].display()))?;
         if Fingerprint::of_bytes(&bytes) != image.content {
             bail!("{} changed while the run was going on; start it again", files[position].display());

@@ -1,7 +1,8 @@
 //! Which pixels show structure, and which only water.
 
 use super::images::{ImageEntry, ImageList};
-use crate::config::{Config, IpConfig, MaskStrategy, Polarity};
+use crate::config::{Config, MaskStrategy, OtsuOf};
+use crate::masker::{Masker, ip_options};
 use crate::stage::{Outcome, Stage, Work};
 use crate::store::{Fingerprint, Hashes, Warning};
 use anyhow::{Context, Result};
@@ -12,17 +13,35 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "mask", version: 1, upstream: &["ingest"], options, inputs, work };
+pub const STAGE: Stage = Stage { name: "mask", version: 2, upstream: &["ingest"], options, inputs, work };
 
 fn options(config: &Config) -> Value {
-    match config.mask.strategy {
-        MaskStrategy::Ip => json!({"strategy": config.mask.strategy, "ip": config.mask.ip}),
-        _ => json!({"strategy": config.mask.strategy}),
+    let mask = &config.mask;
+    let mut options = json!({"strategy": mask.strategy});
+    if mask.strategy.has_ip() || mask.strategy.has_ml() {
+        options["areas"] = json!(mask.areas);
+        options["preprocessing"] = json!(mask.preprocessing);
     }
+    if mask.strategy.has_ip() {
+        options["ip"] = json!(mask.ip);
+    }
+    if mask.strategy.has_ml() {
+        options["ml"] = json!(mask.ml);
+    }
+    if mask.strategy == MaskStrategy::IpMl {
+        options["combine"] = json!(mask.combine);
+    }
+    options
 }
 
-/// Every file that the patterns could mean.
+/// Every file that the patterns could mean, or the model with its card.
 fn inputs(config: &Config, hashes: &Hashes) -> BTreeMap<String, String> {
+    if config.mask.strategy.has_ml() {
+        return match &config.mask.ml.model {
+            Some(model) => hashes.of_files(vec![("model".to_owned(), model.clone()), ("card".to_owned(), model.with_extension("toml"))]),
+            None => BTreeMap::from([("model".to_owned(), models::sha256(models::BUILT_IN_CARD.as_bytes()))]),
+        };
+    }
     if config.mask.strategy != MaskStrategy::Files {
         return BTreeMap::new();
     }
@@ -61,43 +80,105 @@ pub fn content(work: &Work<'_>, list: &ImageList, image: &ImageEntry) -> Fingerp
     work.content("mask", &mask_file(list, work.config.mask.strategy, image)).unwrap_or_else(|_| Fingerprint::of_bytes(b""))
 }
 
+/// Whether an image shows no structure at all: later stages leave it out.
+#[must_use]
+pub fn is_empty(work: &Work<'_>, image: &ImageEntry) -> bool {
+    let empty = work.done.get("mask").and_then(|stamp| stamp.figures["empty_images"].as_array());
+    empty.is_some_and(|names| names.iter().any(|name| name == image.name.as_str()))
+}
+
 fn work(work: &Work<'_>) -> Result<Outcome> {
     let list = ImageList::load(work)?;
     let strategy = work.config.mask.strategy;
     if strategy == MaskStrategy::None {
         return Ok(Outcome { figures: json!({"strategy": strategy, "note": "none"}), warnings: Vec::new() });
     }
+    let masker = Masker::new(&work.config.mask)?;
+    let thresholds = thresholds(work, &list, &masker)?;
     work.progress.begin("masks", list.images.len());
     let made: Vec<Result<Result<f64, Warning>>> = list
         .images
         .par_iter()
         .map(|image| {
-            let made = one_mask(work, &list, image);
+            let made = one_mask(work, &list, image, &masker, thresholds[image.camera]);
             work.progress.advance(1);
             made
         })
         .collect();
-    let (mut shares, mut warnings) = (Vec::new(), Vec::new());
-    for mask in made {
+    let (mut shares, mut warnings, mut empty) = (Vec::new(), Vec::new(), Vec::new());
+    let mut per_camera = vec![(0.0, 0usize); list.cameras.len()];
+    for (image, mask) in list.images.iter().zip(made) {
         match mask? {
-            Ok(share) => shares.push(share),
+            Ok(share) => {
+                shares.push(share);
+                per_camera[image.camera].0 += 1.0 - share;
+                per_camera[image.camera].1 += 1;
+                if share == 0.0 {
+                    empty.push(image.name.clone());
+                }
+            }
             Err(warning) => warnings.push(warning),
         }
     }
     let masked_ratio = (!shares.is_empty()).then(|| 1.0 - shares.iter().sum::<f64>() / shares.len() as f64);
-    let empty = shares.iter().filter(|s| **s == 0.0).count();
     let note = format!("{} masks, {:.0} % of the pixels masked", shares.len(), 100.0 * masked_ratio.unwrap_or(0.0));
-    let figures = json!({"strategy": strategy, "masks": shares.len(), "empty": empty, "masked_ratio": masked_ratio, "note": note});
+    let of_camera = |(name, (sum, n)): (&String, &(f64, usize))| (name.clone(), (*n > 0).then(|| sum / *n as f64).into());
+    let per_camera: serde_json::Map<String, Value> = list.cameras.iter().map(|c| &c.name).zip(&per_camera).map(of_camera).collect();
+    let mut figures = json!({
+        "strategy": strategy,
+        "masks": shares.len(),
+        "empty": empty.len(),
+        "empty_images": empty,
+        "masked_ratio": masked_ratio,
+        "masked_ratio_by_camera": per_camera,
+        "note": note,
+    });
+    if let Some((name, sha256)) = masker.model() {
+        figures["classifier"] = json!({"name": name, "sha256": sha256, "runtime": masker.library()});
+    }
     Ok(Outcome { figures, warnings })
 }
 
+/// The threshold of each camera, where it is of the whole dive.
+fn thresholds(work: &Work<'_>, list: &ImageList, masker: &Masker<'_>) -> Result<Vec<Option<u8>>> {
+    let config = &work.config.mask;
+    if !config.strategy.has_ip() || config.ip.otsu == OtsuOf::Image {
+        return Ok(vec![None; list.cameras.len()]);
+    }
+    work.progress.begin("grey values", list.images.len());
+    let histograms: Vec<Result<Option<[u64; 256]>>> = list
+        .images
+        .par_iter()
+        .map(|image| {
+            let rgb = imaging::decode_rgb(&list.bytes(work, image)?);
+            work.progress.advance(1);
+            // A damaged image is told when its mask is made.
+            let Ok(rgb) = rgb else { return Ok(None) };
+            let options = ip_options(&config.ip, &config.areas, rgb.width(), rgb.height());
+            Ok(Some(masking::histogram(&masker.prepared(rgb), &options)))
+        })
+        .collect();
+    let mut sums = vec![[0u64; 256]; list.cameras.len()];
+    for (image, histogram) in list.images.iter().zip(histograms) {
+        if let Some(histogram) = histogram? {
+            sums[image.camera].iter_mut().zip(histogram).for_each(|(sum, n)| *sum += n);
+        }
+    }
+    Ok(sums.iter().map(|histogram| masking::otsu(histogram).map(|split| split.threshold)).collect())
+}
+
 /// Makes or takes over a mask; gives its share of structure, or why the image has none.
-fn one_mask(work: &Work<'_>, list: &ImageList, image: &ImageEntry) -> Result<Result<f64, Warning>> {
+fn one_mask(
+    work: &Work<'_>,
+    list: &ImageList,
+    image: &ImageEntry,
+    masker: &Masker<'_>,
+    threshold: Option<u8>,
+) -> Result<Result<f64, Warning>> {
     let path = mask_file(list, work.config.mask.strategy, image);
     let made = match work.config.mask.strategy {
-        MaskStrategy::None => return Ok(Ok(1.0)),
         MaskStrategy::Files => from_file(work, image, &path)?,
-        MaskStrategy::Ip => by_image_processing(work, list, image, &path)?,
+        _ => from_image(work, list, image, &path, masker, threshold)?,
     };
     if let Err(message) = made {
         return Ok(Err(Warning { about: image.name.clone(), message: format!("{message}; all of the image takes part") }));
@@ -127,43 +208,33 @@ fn from_file(work: &Work<'_>, image: &ImageEntry, path: &str) -> Result<Result<(
     }
 }
 
-fn by_image_processing(work: &Work<'_>, list: &ImageList, image: &ImageEntry, path: &str) -> Result<Result<(), String>> {
+fn from_image(
+    work: &Work<'_>,
+    list: &ImageList,
+    image: &ImageEntry,
+    path: &str,
+    masker: &Masker<'_>,
+    threshold: Option<u8>,
+) -> Result<Result<(), String>> {
     let options = options(work.config).to_string();
     let version = STAGE.version.to_le_bytes();
     let key = Fingerprint::of_parts([
         ("version", version.as_slice()),
         ("options", options.as_bytes()),
         ("image", image.content.as_bytes().as_slice()),
+        ("threshold", threshold.as_slice()),
+        ("model", masker.model().map_or("", |m| m.1).as_bytes()),
+        ("runtime", masker.library().unwrap_or_default().as_bytes()),
     ]);
     if work.files.reuse(path, key) {
         return Ok(Ok(()));
     }
     match imaging::decode_rgb(&list.bytes(work, image)?) {
         Ok(rgb) => {
-            let made = masking::ip_mask(&rgb, &ip_options(&work.config.mask.ip));
+            let made = masker.mask(&masker.prepared(rgb), threshold).with_context(|| image.name.clone())?;
             work.files.save(path, key, &imaging::encode_png_grey(&made.mask)?)?;
             Ok(Ok(()))
         }
         Err(error) => Ok(Err(format!("it cannot be masked: {error}"))),
-    }
-}
-
-fn ip_options(config: &IpConfig) -> masking::IpOptions {
-    masking::IpOptions {
-        channel: config.channel as usize,
-        working_long_side_px: config.working_long_side_px as usize,
-        blur_sigma_px: config.blur_sigma_px,
-        canny: masking::CannyThresholds { low: config.canny_low, high: config.canny_high },
-        closing_radius: config.closing_radius,
-        min_structure_area: config.min_structure_area,
-        min_hole_area: config.min_hole_area,
-        polarity: match config.polarity {
-            Polarity::Dark => masking::Polarity::Dark,
-            Polarity::Bright => masking::Polarity::Bright,
-            Polarity::Auto => masking::Polarity::Auto,
-        },
-        min_textured_share: config.min_textured_share,
-        reach: config.reach,
-        min_texture: config.min_texture,
     }
 }

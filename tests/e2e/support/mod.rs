@@ -118,7 +118,15 @@ fn collect_keys(value: &serde_json::Value, path: &str, keys: &mut Vec<String>) {
     match value {
         serde_json::Value::Object(map) => {
             for (name, below) in map {
-                let free = matches!(path, "stages" | "world" | "cameras[].params" | "cameras[].sigmas" | "evaluation.c2m_percentiles_m");
+                let free = matches!(
+                    path,
+                    "stages"
+                        | "world"
+                        | "masks.masked_ratio_by_camera"
+                        | "cameras[].params"
+                        | "cameras[].sigmas"
+                        | "evaluation.c2m_percentiles_m"
+                );
                 let name = if free { "*" } else { name };
                 collect_keys(below, &if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }, keys);
             }
