@@ -23,5 +23,5 @@ pub use error::DenseError;
 pub use estimate::{DepthOptions, estimate_depth, estimate_depth_from_seeds};
 pub use fuse::{Fusion, FusionOptions, FusionSummary, fuse};
 pub use quality::{Quality, fit};
-pub use select::{DepthSeed, ViewSelectionOptions, depth_range, depth_seeds, select_views};
+pub use select::{DepthSeed, ViewSelectionOptions, depth_range, depth_seeds, median_distance, select_views};
 pub use view::View;

@@ -60,7 +60,7 @@ pub(crate) struct Rectified {
 /// [`MAX_GROWTH`] and [`MAX_TANGENT`]. A view that already is a pinhole is only copied.
 pub(crate) fn rectify(view: &View) -> Result<Rectified, DenseError> {
     view.validate()?;
-    if view.camera.model() == CameraModel::Pinhole {
+    if view.camera.model() == CameraModel::Pinhole && view.camera.port().is_none() {
         let valid = view.mask.as_ref().map_or_else(
             || Raster::filled(view.rgb.width(), view.rgb.height(), INSIDE | ACTIVE),
             |mask| mask.map(|&m| if m >= 128 { INSIDE | ACTIVE } else { INSIDE }),
@@ -74,7 +74,7 @@ pub(crate) fn rectify(view: &View) -> Result<Rectified, DenseError> {
     for y in 0..h {
         for x in 0..w {
             let direction = Vector3::new((x as f64 + 0.5 - cx) / fx, (y as f64 + 0.5 - cy) / fy, 1.0);
-            let Some(pixel) = view.camera.project(&direction) else { continue };
+            let Some(pixel) = view.camera.project_direction(&direction) else { continue };
             let Some((colour, grey)) = bilinear(&view.rgb, &pixel) else { continue };
             out.rgb[(x, y)] = colour;
             out.grey[(x, y)] = grey;

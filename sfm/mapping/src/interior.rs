@@ -92,6 +92,7 @@ fn trial(empty: &Model, allowed: &[bool], options: &OrientOptions) -> Result<Opt
 
 /// Whether a lens can be like this.
 pub(crate) fn is_plausible(camera: &Camera) -> bool {
+    let camera = camera.in_air();
     let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
     let focal = camera.mean_focal();
     let focals: Vec<f64> =

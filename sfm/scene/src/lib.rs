@@ -18,7 +18,7 @@ pub mod raster;
 pub mod reconstruction;
 pub mod rigid;
 
-pub use camera::{Camera, CameraError, CameraModel, FlatPort};
+pub use camera::{Camera, CameraError, CameraModel, FlatPort, PortError};
 pub use cloud::Cloud;
 pub use ids::{CameraId, FrameId, ImageId, KeypointIndex, PointId, RigId};
 pub use keypoint::{Descriptor, Features, Keypoint};

@@ -6,6 +6,7 @@ mod exact;
 mod failures;
 mod global;
 mod lengths;
+mod port;
 mod quality;
 mod rig;
 mod single;

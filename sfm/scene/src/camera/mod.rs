@@ -3,6 +3,7 @@
 //! All models map a direction to normalised coordinates (u, v) = (X/Z, Y/Z), distort these, and scale them to pixels.
 //! Parameters stand in COLMAP's order where COLMAP has the model.
 
+mod central;
 mod distortion;
 mod model;
 mod port;
@@ -11,5 +12,5 @@ mod projection;
 mod tests;
 
 pub use model::{Camera, CameraError, CameraModel, MAX_CAMERA_PARAMS, ParamKind};
-pub use port::FlatPort;
+pub use port::{FlatPort, PortError};
 pub use projection::ProjectionJacobians;

@@ -1,5 +1,6 @@
 //! Which camera models exist and what their parameters mean.
 
+use super::port::{FlatPort, PortError};
 use thiserror::Error;
 
 /// The largest number of parameters of any model.
@@ -125,13 +126,15 @@ pub enum CameraError {
     },
 }
 
-/// The interior orientation of a camera.
+/// The interior orientation of a camera: the model of its lens, and the window that it looks through, where that is modelled by itself. Behind a
+/// [`FlatPort`] the parameters are those of the lens in air, and points in the camera's frame lie in the water.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     pub(super) model: CameraModel,
     width: u32,
     height: u32,
     pub(super) params: [f64; MAX_CAMERA_PARAMS],
+    pub(super) port: Option<FlatPort>,
 }
 
 impl Camera {
@@ -154,7 +157,7 @@ impl Camera {
         }
         let mut all = [0.0; MAX_CAMERA_PARAMS];
         all[..params.len()].copy_from_slice(params);
-        Ok(Self { model, width, height, params: all })
+        Ok(Self { model, width, height, params: all, port: None })
     }
 
     /// A camera of the given focal length in pixels, principal point in the middle, no distortion.
@@ -173,6 +176,34 @@ impl Camera {
             })
             .collect();
         Self::new(model, width, height, &params)
+    }
+
+    /// The same lens behind a port, or without one.
+    ///
+    /// # Errors
+    /// [`PortError`] where there can be no such port.
+    pub fn behind(self, port: Option<FlatPort>) -> Result<Self, PortError> {
+        port.iter().try_for_each(FlatPort::check)?;
+        Ok(Self { port, ..self })
+    }
+
+    /// The lens alone.
+    #[must_use]
+    pub fn in_air(&self) -> Self {
+        Self { port: None, ..*self }
+    }
+
+    /// The same with directions that are exact at another distance; the camera itself without a port, or where that lies within the housing.
+    #[must_use]
+    pub fn with_object_distance(&self, object_distance_m: f64) -> Self {
+        let port = self.port.map(|port| FlatPort { object_distance_m, ..port });
+        self.behind(port).unwrap_or(*self)
+    }
+
+    /// The port that it looks through.
+    #[must_use]
+    pub fn port(&self) -> Option<&FlatPort> {
+        self.port.as_ref()
     }
 
     /// The model.
@@ -205,9 +236,15 @@ impl Camera {
         &mut self.params[..count]
     }
 
-    /// Mean of the focal lengths, pixels.
+    /// Mean of the focal lengths, pixels: on the axis the size in the image of what is as large as it is far. Behind a port it is longer by the
+    /// index of the water.
     #[must_use]
     pub fn mean_focal(&self) -> f64 {
+        let longer = self.port.map_or(1.0, |port| port.index_water / port.index_air);
+        longer * self.mean_focal_in_air()
+    }
+
+    fn mean_focal_in_air(&self) -> f64 {
         match self.model {
             CameraModel::Pinhole | CameraModel::OpenCv | CameraModel::Fisheye => (self.params[0] + self.params[1]) / 2.0,
             CameraModel::SimpleRadial | CameraModel::Radial => self.params[0],
@@ -247,6 +284,7 @@ impl Camera {
                 }
             }
         }
-        Self::new(self.model, width, height, &params[..self.model.param_count()])
+        let resized = Self::new(self.model, width, height, &params[..self.model.param_count()])?;
+        Ok(Self { port: self.port, ..resized })
     }
 }

@@ -32,9 +32,26 @@ impl Camera {
     /// The pixel of a point in the camera frame.
     ///
     /// `None` behind the camera, on its plane, and where the distortion polynomial has folded back (far outside the
-    /// image). The pixel may lie outside the image.
+    /// image); behind a port also within the housing. The pixel may lie outside the image.
     #[must_use]
     pub fn project(&self, x_in_cam: &Vector3<f64>) -> Option<Vector2<f64>> {
+        match &self.port {
+            None => self.project_in_air(x_in_cam),
+            Some(port) => self.project_in_air(&port.direction_in_air(x_in_cam)?),
+        }
+    }
+
+    /// The pixel of a direction from the projection centre: without a port that of any point on it, behind one that of the point at
+    /// the port's object distance. [`Camera::unproject`] is its inverse.
+    #[must_use]
+    pub fn project_direction(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
+        match &self.port {
+            None => self.project_in_air(direction),
+            Some(port) => self.project(&(direction * (port.object_distance_m / direction.norm()))),
+        }
+    }
+
+    fn project_in_air(&self, x_in_cam: &Vector3<f64>) -> Option<Vector2<f64>> {
         if !in_front(x_in_cam) {
             return None;
         }
@@ -49,9 +66,17 @@ impl Camera {
         Vector2::new(fx * u + cx, fy * v + cy)
     }
 
-    /// As [`Camera::project`], with derivatives.
+    /// As [`Camera::project`], with derivatives; those by the parameters are of the lens.
     #[must_use]
     pub fn project_with_jacobians(&self, x_in_cam: &Vector3<f64>) -> Option<ProjectionJacobians> {
+        let Some(port) = &self.port else { return self.project_in_air_with_jacobians(x_in_cam) };
+        let (direction, d_point) = port.direction_with_jacobian(x_in_cam)?;
+        let mut out = self.project_in_air_with_jacobians(&direction)?;
+        out.d_point *= d_point;
+        Some(out)
+    }
+
+    fn project_in_air_with_jacobians(&self, x_in_cam: &Vector3<f64>) -> Option<ProjectionJacobians> {
         if !in_front(x_in_cam) {
             return None;
         }
@@ -87,12 +112,20 @@ impl Camera {
         Some(ProjectionJacobians { pixel: self.pixel_from_distorted(d.u, d.v), d_point, d_params })
     }
 
-    /// Undistorted normalised coordinates (X/Z, Y/Z) of a pixel.
+    /// Undistorted normalised coordinates (X/Z, Y/Z) of a pixel; behind a port those of the point of its ray at the port's object distance.
     ///
-    /// Newton's method from the distorted coordinates. `None` where the model has no inverse (pixels beyond the fold of
-    /// the polynomial).
+    /// `None` where the model has no inverse (pixels beyond the fold of the polynomial).
     #[must_use]
     pub fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
+        let uv = self.unproject_in_air(pixel)?;
+        match &self.port {
+            None => Some(uv),
+            Some(port) => port.point_at_object_distance(&uv.push(1.0)).filter(in_front).map(|x| x.xy() / x.z),
+        }
+    }
+
+    /// Newton's method from the distorted coordinates.
+    fn unproject_in_air(&self, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
         let (fx, fy) = self.focals();
         let [cx, cy] = self.principal_point();
         let target = Vector2::new((pixel.x - cx) / fx, (pixel.y - cy) / fy);

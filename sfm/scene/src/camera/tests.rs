@@ -1,5 +1,5 @@
 use super::*;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Unit, Vector2, Vector3};
 use proptest::prelude::*;
 
 fn cameras() -> Vec<Camera> {
@@ -11,7 +11,24 @@ fn cameras() -> Vec<Camera> {
         &[600.0, 605.0, 650.0, 390.0, 0.03, -0.01, 0.004, -0.001],
         &[1200.0, 650.0, 390.0, 0.19, 0.4, -0.1, 0.002, -0.001, 0.003, -0.0005],
     ];
-    CameraModel::ALL.into_iter().zip(params).map(|(m, p)| Camera::new(m, 1300, 780, p).expect("valid")).collect()
+    let mut cameras: Vec<Camera> =
+        CameraModel::ALL.into_iter().zip(params).map(|(m, p)| Camera::new(m, 1300, 780, p).expect("valid")).collect();
+    // The same laws behind ports, one of which is tilted.
+    cameras.push(cameras[0].behind(Some(port(Vector3::z()))).expect("possible"));
+    cameras.push(cameras[5].behind(Some(port(Vector3::new(0.08, -0.05, 1.0)))).expect("possible"));
+    cameras
+}
+
+fn port(normal: Vector3<f64>) -> FlatPort {
+    FlatPort {
+        normal: Unit::new_normalize(normal),
+        distance_m: 0.03,
+        thickness_m: 0.008_42,
+        index_air: 1.0,
+        index_port: 1.49,
+        index_water: 1.34,
+        object_distance_m: 2.0,
+    }
 }
 
 proptest! {
@@ -20,7 +37,7 @@ proptest! {
         for camera in cameras() {
             let pixel = Vector2::new(x, y);
             let uv = camera.unproject(&pixel).expect("inside the image");
-            let back = camera.project(&Vector3::new(2.0 * uv.x, 2.0 * uv.y, 2.0)).expect("in front");
+            let back = camera.project_direction(&Vector3::new(2.0 * uv.x, 2.0 * uv.y, 2.0)).expect("in front");
             prop_assert!((back - pixel).norm() < 1e-8, "{:?}: {pixel} became {back}", camera.model());
         }
     }
@@ -80,6 +97,37 @@ fn resized_camera_sees_the_same_field() {
         let x = Vector3::new(0.2, -0.1, 1.0);
         let (full, small) = (camera.project(&x).expect("ok"), half.project(&x).expect("ok"));
         assert!((full / 2.0 - small).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn behind_a_port_derivatives_hold_on_its_normal() {
+    let camera = cameras()[6];
+    for r in [0.0, 1e-14, 1e-9, 1e-5] {
+        let x = Vector3::new(r, -0.5 * r, 2.0);
+        let j = camera.project_with_jacobians(&x).expect("seen");
+        for k in 0..3 {
+            let h = Vector3::ith(k, 1e-6);
+            let d = (camera.project(&(x + h)).expect("ok") - camera.project(&(x - h)).expect("ok")) / 2e-6;
+            assert!((d - j.d_point.column(k)).norm() < 1e-3, "{r}, {k}: {d} {}", j.d_point);
+        }
+    }
+}
+
+#[test]
+fn impossible_ports_are_refused() {
+    let camera = cameras()[0];
+    let good = port(Vector3::z());
+    assert!(camera.behind(Some(good)).is_ok());
+    for (bad, word) in [
+        (FlatPort { distance_m: -0.01, ..good }, "distance"),
+        (FlatPort { thickness_m: f64::NAN, ..good }, "thickness"),
+        (FlatPort { index_water: 0.9, ..good }, "water"),
+        (FlatPort { object_distance_m: 0.03, ..good }, "object"),
+        (port(-Vector3::z()), "normal"),
+    ] {
+        let error = camera.behind(Some(bad)).expect_err("impossible").to_string();
+        assert!(error.contains(word), "{error}");
     }
 }
 

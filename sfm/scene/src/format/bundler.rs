@@ -54,6 +54,9 @@ pub fn write_bundler(reconstruction: &Reconstruction, bundle: &mut dyn Write, li
 /// Focal length and radial terms; else what is in the way.
 fn interior(camera: &Camera) -> Result<[f64; 3], String> {
     let p = camera.params();
+    if camera.port().is_some() {
+        return Err("stands behind a port".to_owned());
+    }
     let found = match camera.model() {
         CameraModel::Pinhole if p[0] == p[1] => [p[0], 0.0, 0.0],
         CameraModel::SimpleRadial => [p[0], p[3], 0.0],

@@ -11,7 +11,7 @@ const FORMAT: &str = "transforms.json";
 /// those of OpenGL (x right, y up, z backward). The world stays as it is. The centre of the top-left pixel is (0.5, 0.5) there too.
 ///
 /// # Errors
-/// [`FormatError::NotRepresentable`] for Brown's model with affinity or shear, which the format lacks; what the stream says.
+/// [`FormatError::NotRepresentable`] for Brown's model with affinity or shear and for cameras behind a port, which the format lacks; what the stream says.
 pub fn write_nerfstudio(reconstruction: &Reconstruction, out: &mut dyn Write) -> Result<(), FormatError> {
     let mut frames = Vec::new();
     for image in reconstruction.oriented_images() {
@@ -27,7 +27,7 @@ fn frame(reconstruction: &Reconstruction, image: ImageId) -> Result<Value, Forma
     let pose = reconstruction.cam_from_world(image).ok_or_else(|| refuse(format!("image {} has no pose", entry.name)))?;
     let camera = &reconstruction.cameras[entry.camera.index()];
     let mut frame = interior(camera).ok_or_else(|| {
-        refuse(format!("the camera of {} has affinity or shear (C1, C2): orient with fixed = [\"c1\", \"c2\"]", entry.name))
+        refuse(format!("the camera of {} stands behind a port, or has affinity or shear (C1, C2): without a port, orient with fixed = [\"c1\", \"c2\"]", entry.name))
     })?;
     let (r, c) = (pose.rotation_matrix(), pose.centre());
     // Columns: the axes of the camera in the world, y and z turned round.
@@ -41,6 +41,9 @@ fn frame(reconstruction: &Reconstruction, image: ImageId) -> Result<Value, Forma
 /// Keys of the interior orientation; `None` where the format has no such camera.
 fn interior(camera: &Camera) -> Option<Map<String, Value>> {
     let p = camera.params();
+    if camera.port().is_some() {
+        return None;
+    }
     let (model, focal, centre, names, distortion): (_, _, _, &[&str], Vec<f64>) = match camera.model() {
         CameraModel::Pinhole => ("OPENCV", [p[0], p[1]], [p[2], p[3]], &[], Vec::new()),
         CameraModel::SimpleRadial => ("OPENCV", [p[0], p[0]], [p[1], p[2]], &["k1"], vec![p[3]]),

@@ -126,7 +126,9 @@ impl PoseEstimator {
             return;
         };
         let direction = uv.push(1.0);
-        let Some(at) = camera.project_with_jacobians(&direction) else {
+        // Behind a port rays do not meet: what is linearised is the point at its object distance.
+        let depth = camera.port().map_or(1.0, |port| port.object_distance_m / direction.norm());
+        let Some(at) = camera.project_with_jacobians(&(direction * depth)) else {
             return;
         };
         self.source.push(index);
@@ -134,9 +136,9 @@ impl PoseEstimator {
         self.points.push(c.x_in_world);
         self.u.push(uv.x);
         self.v.push(uv.y);
-        // At Z = 1 the derivative by X and Y is the one by the normalised coordinates.
+        // The derivative by X and Y times Z is the one by the normalised coordinates.
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
-            self.d[k].push(at.d_point[(i, j)]);
+            self.d[k].push(depth * at.d_point[(i, j)]);
         }
         for k in 0..3 {
             self.x[k].push(c.x_in_world[k]);

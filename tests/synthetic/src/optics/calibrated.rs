@@ -1,12 +1,9 @@
 //! The camera that a calibration in water gives: one projection centre and Brown's distortion, which take up what lens and window do.
 
 use super::{Lens, Window};
-use nalgebra::{DMatrix, DVector, Vector2, Vector3};
-use scene::{Camera, CameraModel};
+use nalgebra::{Vector2, Vector3};
+use scene::Camera;
 
-/// Parameters of Brown's model that are fitted: c x0 y0 A1 A2 A3 B1 B2. Affinity and shear stay zero.
-const FITTED: usize = 8;
-const ROUNDS: usize = 12;
 /// Points of the calibration along each side of the frame.
 const GRID: usize = 25;
 
@@ -23,7 +20,7 @@ pub struct Calibrated {
 
 /// Fits Brown's model to what a lens sees through a window, at one distance from the camera.
 ///
-/// Gauss-Newton on a grid of pixels that are followed to the sphere of that distance. Without a window it finds the lens itself.
+/// Least squares on a grid of pixels that are followed to the sphere of that distance. Without a window it finds the lens itself.
 /// `None` when the normal equations are singular, which frames of a few pixels lead to.
 #[must_use]
 pub fn calibrate(lens: &Lens, window: Option<&Window>, width: u32, height: u32, distance_m: f64) -> Option<Calibrated> {
@@ -39,20 +36,7 @@ pub fn calibrate(lens: &Lens, window: Option<&Window>, width: u32, height: u32, 
         }
     }
     let start = lens.focal_px * window.map_or(1.0, |window| window.indices[2] / window.indices[0]);
-    let mut camera = Camera::from_focal(CameraModel::Brown, width, height, start).ok()?;
-    for _ in 0..ROUNDS {
-        let mut normal = DMatrix::<f64>::zeros(FITTED, FITTED);
-        let mut right = DVector::<f64>::zeros(FITTED);
-        for (pixel, point) in &seen {
-            let projected = camera.project_with_jacobians(point)?;
-            let residual = pixel - projected.pixel;
-            let jacobian = projected.d_params.fixed_columns::<FITTED>(0);
-            normal += jacobian.transpose() * jacobian;
-            right += jacobian.transpose() * residual;
-        }
-        let step = normal.cholesky()?.solve(&right);
-        camera.params_mut().iter_mut().zip(step.iter()).for_each(|(p, s)| *p += s);
-    }
+    let camera = Camera::fit_brown(width, height, start, &seen)?;
     let misses: Vec<f64> = seen.iter().map(|(pixel, point)| camera.project(point).map(|p| (p - pixel).norm())).collect::<Option<_>>()?;
     let rms_px = (misses.iter().map(|m| m * m).sum::<f64>() / misses.len() as f64).sqrt();
     Some(Calibrated { camera, rms_px, max_px: misses.into_iter().fold(0.0, f64::max) })

@@ -3,6 +3,9 @@
 use nalgebra::Vector3;
 use scene::FlatPort;
 
+/// Where directions of the camera models behind the window are exact, metres: vehicles keep two to four metres from what they survey.
+const OBJECT_DISTANCE_M: f64 = 3.0;
+
 /// A plane-parallel window that a ray passes from the lens outwards, by the vector form of Snell's law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
@@ -44,6 +47,7 @@ impl Window {
             index_air,
             index_port,
             index_water,
+            object_distance_m: OBJECT_DISTANCE_M,
         }
     }
 }

@@ -30,7 +30,7 @@ pub(super) fn model_from_name(name: &str) -> Option<ColmapCameraModel> {
     READABLE.into_iter().find(|m| m.name == name)
 }
 
-/// Our camera as COLMAP's; `None` for Brown's model with shear (C2), which COLMAP cannot express.
+/// Our camera as COLMAP's; `None` for Brown's model with shear (C2) and behind a port, which COLMAP cannot express.
 ///
 /// All models but Brown's are the same function. Brown's affinity C1 adds c C1 u to x, whereas two focal lengths also
 /// scale the distortion: with fx = c (1 + C1), fy = c and the coefficients divided by 1 + C1/2 the difference is
@@ -38,6 +38,9 @@ pub(super) fn model_from_name(name: &str) -> Option<ColmapCameraModel> {
 /// 50 px of distortion that is 0.0025 px.
 pub(super) fn to_colmap(camera: &Camera) -> Option<(ColmapCameraModel, Vec<f64>)> {
     let p = camera.params();
+    if camera.port().is_some() {
+        return None;
+    }
     Some(match camera.model() {
         CameraModel::Pinhole => (PINHOLE, p.to_vec()),
         CameraModel::SimpleRadial => (SIMPLE_RADIAL, p.to_vec()),

@@ -24,12 +24,13 @@ impl<'a> ColmapModel<'a> {
     /// Selects the oriented part and checks that COLMAP can hold it.
     ///
     /// # Errors
-    /// [`FormatError::NotRepresentable`] where a camera has no COLMAP model (Brown's with shear), a reference points to
+    /// [`FormatError::NotRepresentable`] where a camera has no COLMAP model (Brown's with shear, any behind a port), a reference points to
     /// nothing, an image's camera is not part of its rig, two points share a keypoint, a number is not finite, or a name
     /// is empty or holds a control character.
     pub fn new(reconstruction: &'a Reconstruction) -> Result<Self, FormatError> {
         let cameras = reconstruction.cameras.iter().enumerate().map(|(i, camera)| {
-            to_colmap(camera).ok_or_else(|| refuse(format!("camera {i} has shear (C2), which no COLMAP camera model has")))
+            to_colmap(camera)
+                .ok_or_else(|| refuse(format!("camera {i} has shear (C2) or stands behind a port, which no COLMAP camera model has")))
         });
         let cameras = cameras.collect::<Result<_, _>>()?;
         check_rigs(reconstruction)?;
