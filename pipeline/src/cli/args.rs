@@ -176,6 +176,8 @@ pub enum Water {
 pub enum Port {
     /// A flat acrylic window: rays are refracted.
     Flat,
+    /// The same, and dive.toml describes it: orientation follows the refracted rays.
+    Known,
     /// Nothing: pinhole cameras with lens distortion.
     None,
 }

@@ -78,9 +78,10 @@ fn options(args: &SynthArgs, file: Option<&Path>, folder: &Path) -> Result<DiveO
         kind.apply(&mut options.water);
     }
     if let Some(port) = args.port {
-        options.rig.port.kind = match port {
-            Port::Flat => PortKind::Flat,
-            Port::None => PortKind::None,
+        (options.rig.port.kind, options.rig.port.known) = match port {
+            Port::Flat => (PortKind::Flat, false),
+            Port::Known => (PortKind::Flat, true),
+            Port::None => (PortKind::None, false),
         };
     }
     if let Some(noise) = args.noise {

@@ -3,19 +3,27 @@
 use super::error::{ConfigError, Source};
 use super::keys::check_names;
 use super::model::InteriorConfig;
-use super::raw::{RawFixed, RawInterior};
+use super::raw::{RawFixed, RawInterior, RawPort};
 use super::values::Values;
-use scene::CameraModel;
+use nalgebra::{Unit, Vector3};
 use scene::camera::ParamKind;
+use scene::{CameraModel, FlatPort};
 use std::path::Path;
 use toml::Spanned;
 
 /// Model of cameras of which no model is given: enough for the distortion of most lenses, also behind a port.
 const DEFAULT_MODEL: CameraModel = CameraModel::Radial;
 
+/// Refractive index of acrylic glass.
+const ACRYLIC: f64 = 1.49;
+/// Refractive index of sea water, 540 nm, 10 to 20 degrees.
+const SEA_WATER: f64 = 1.34;
+/// Distance at which directions through a port are exact, metres.
+const OBJECT_DISTANCE_M: f64 = 3.0;
+
 impl Default for InteriorConfig {
     fn default() -> Self {
-        Self { model: DEFAULT_MODEL, size: None, params: Vec::new(), fixed: false, held: Vec::new(), sigmas: Vec::new() }
+        Self { model: DEFAULT_MODEL, size: None, params: Vec::new(), fixed: false, held: Vec::new(), sigmas: Vec::new(), port: None }
     }
 }
 
@@ -25,11 +33,11 @@ pub(super) fn resolve(source: &mut Source<'_>, folder: &Path, raw: Option<&Spann
     let interior = raw.get_ref();
     let Some(file) = &interior.file else { return values(source, interior, raw.span()) };
     let key = "camera.interior.file";
-    if interior.model.is_some() || !interior.params().is_empty() {
+    if interior.model.is_some() || !interior.params().is_empty() || interior.port.is_some() {
         source.problem(
             Some(file.span()),
             key,
-            "stands beside a model or parameters",
+            "stands beside a model, parameters or a port",
             Some("give either `file`, or the model and its parameters".to_owned()),
         );
     }
@@ -80,6 +88,11 @@ fn values(source: &mut Source<'_>, raw: &RawInterior, whole: std::ops::Range<usi
     }
     (config.fixed, config.held) = fixed(&mut values, raw, config.model);
     config.sigmas = sigmas(&mut values, raw, &config);
+    config.port = raw.port.as_ref().and_then(|place| port(&mut values, place));
+    if let (true, Some(port)) = (given.is_empty(), &raw.port) {
+        let hint = "add them: behind a port they are those of the lens in air";
+        values.problem_with_hint(port.span(), "camera.interior.port", "the parameters of the lens are missing", hint);
+    }
     if let (true, true, Some(fixed)) = (config.fixed, given.is_empty(), &raw.fixed) {
         values.problem_with_hint(
             fixed.span(),
@@ -128,6 +141,37 @@ fn sigmas(values: &mut Values<'_, '_>, raw: &RawInterior, config: &InteriorConfi
         }
     }
     sigmas
+}
+
+/// The window that the camera looks through.
+fn port(values: &mut Values<'_, '_>, place: &Spanned<RawPort>) -> Option<FlatPort> {
+    const KEY: &str = "camera.interior.port";
+    let raw = place.get_ref();
+    let key = |name: &str| format!("{KEY}.{name}");
+    for (name, value) in [("distance_m", &raw.distance_m), ("thickness_m", &raw.thickness_m)] {
+        if value.is_none() {
+            values.problem_with_hint(place.span(), &key(name), "is missing", "give it in metres, as measured at the housing");
+        }
+    }
+    let mut number = |name: &str, value, default: f64| values.finite(&key(name), value).unwrap_or(default);
+    let [distance_m, thickness_m] = [number("distance_m", &raw.distance_m, 0.0), number("thickness_m", &raw.thickness_m, 0.0)];
+    let index_air = number("index_air", &raw.index_air, 1.0);
+    let index_port = number("index_port", &raw.index_port, ACRYLIC);
+    let index_water = number("index_water", &raw.index_water, SEA_WATER);
+    let object_distance_m = number("object_distance_m", &raw.object_distance_m, OBJECT_DISTANCE_M);
+    let [x, y, z] = values.numbers(&key("normal"), &raw.normal).unwrap_or([0.0, 0.0, 1.0]);
+    let Some(normal) = Unit::try_new(Vector3::new(x, y, z), 1e-9) else {
+        values.problem(place.span(), &key("normal"), "has no direction");
+        return None;
+    };
+    let port = FlatPort { normal, distance_m, thickness_m, index_air, index_port, index_water, object_distance_m };
+    match port.check() {
+        Ok(()) => Some(port),
+        Err(error) => {
+            values.problem(place.span(), KEY, error.to_string());
+            None
+        }
+    }
 }
 
 fn params(

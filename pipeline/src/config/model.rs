@@ -2,7 +2,7 @@
 
 use super::stage_options::{DensifyConfig, EvaluateConfig, FeaturesConfig, MaskConfig, MatchingConfig, OrientConfig, ReportConfig};
 use nalgebra::UnitQuaternion;
-use scene::{CameraModel, Rigid3};
+use scene::{CameraModel, FlatPort, Rigid3};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -119,6 +119,14 @@ pub struct InteriorConfig {
     pub held: Vec<bool>,
     /// Standard deviation of each given parameter; empty where none is given.
     pub sigmas: Vec<Option<f64>>,
+    /// The window that it looks through, where the parameters are those of the lens in air.
+    #[serde(serialize_with = "port_values", skip_serializing_if = "Option::is_none")]
+    pub port: Option<FlatPort>,
+}
+
+/// Normal, lengths and indices, as they enter fingerprints.
+fn port_values<S: serde::Serializer>(port: &Option<FlatPort>, serializer: S) -> Result<S::Ok, S::Error> {
+    port.as_ref().map(FlatPort::values).serialize(serializer)
 }
 
 fn model_name<S: serde::Serializer>(model: &CameraModel, serializer: S) -> Result<S::Ok, S::Error> {

@@ -54,6 +54,19 @@ pub(super) enum RawFixed {
     Some(Vec<String>),
 }
 
+/// A flat port.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawPort {
+    pub(super) normal: Place<Vec<f64>>,
+    pub(super) distance_m: Place<f64>,
+    pub(super) thickness_m: Place<f64>,
+    pub(super) index_air: Place<f64>,
+    pub(super) index_port: Place<f64>,
+    pub(super) index_water: Place<f64>,
+    pub(super) object_distance_m: Place<f64>,
+}
+
 macro_rules! raw_interior {
     ($($param:ident)*) => {
         /// Interior orientation, in dive.toml or in a file of its own.
@@ -66,6 +79,7 @@ macro_rules! raw_interior {
             pub(super) height: Place<u32>,
             pub(super) fixed: Place<RawFixed>,
             pub(super) sigma: Place<BTreeMap<String, f64>>,
+            pub(super) port: Place<RawPort>,
             $($param: Place<f64>,)*
         }
 

@@ -206,6 +206,28 @@ fn parameters_are_fixed_and_weighed_one_by_one() {
     }
 }
 
+#[test]
+fn ports_are_read_and_impossible_ones_refused() {
+    let of = |text: &str| format!("[[camera]]\nname = \"C3\"\nimages = \"frames/left\"\ninterior = {{ {text} }}\n");
+    let lens = "model = \"pinhole\", fx = 900.0, fy = 900.0";
+    let config = resolved(&of(&format!("{lens}, port = {{ distance_m = 0.03, thickness_m = 0.008 }}")));
+    let port = config.cameras[2].interior.port.expect("given");
+    assert_eq!(port.values(), [0.0, 0.0, 1.0, 0.03, 0.008, 1.0, 1.49, 1.34, 3.0]);
+    for (text, message) in [
+        (format!("{lens}, port = {{ distance_m = 0.03 }}"), "camera.interior.port.thickness_m: is missing\n  hint: give it in metres"),
+        (
+            format!("{lens}, port = {{ distance_m = 0.03, thickness_m = 8.4, object_distance_m = 3.0 }}"),
+            "camera.interior.port: the object distance of a flat port cannot be 3: it lies beyond the window",
+        ),
+        (format!("{lens}, port = {{ distance_m = 0.03, thickness_m = 0.008, normal = [0, 0, 0] }}"), "has no direction"),
+        (format!("{lens}, port = {{ distance_m = 0.03, thickness_m = 0.008, normal = [0, 0, -1] }}"), "it points towards the water"),
+        ("model = \"pinhole\", port = { distance_m = 0.03, thickness_m = 0.008 }".to_owned(), "the parameters of the lens are missing"),
+    ] {
+        let found = messages(&of(&text));
+        assert!(found.contains(message), "{found}");
+    }
+}
+
 /// The same rotation three ways: 90 degrees about y maps z to x.
 #[test]
 fn rotations_agree_in_every_form() {

@@ -145,7 +145,7 @@ fn given(interior: &InteriorConfig, entry: &CameraEntry, (width, height): (u32, 
         let default = if *kind == ParamKind::PrincipalPoint { centre.next().unwrap_or(0.0) } else { 0.0 };
         params.push(value.unwrap_or(default));
     }
-    let camera = Camera::new(interior.model, size.0, size.1, &params)?;
+    let camera = Camera::new(interior.model, size.0, size.1, &params)?.behind(interior.port)?;
     if size == (width, height) || entry.size.is_none() {
         return Ok(camera);
     }

@@ -135,7 +135,8 @@ impl Matcher<'_> {
             let start = &self.starts[entry.camera];
             parts.push(("id", (image as u64).to_le_bytes().to_vec()));
             parts.push(("features", features::content(self.work, self.list, entry)?.as_bytes().to_vec()));
-            let params = start.camera.params().iter().flat_map(|p| p.to_le_bytes());
+            let port = start.camera.port().map(scene::FlatPort::values);
+            let params = start.camera.params().iter().chain(port.iter().flatten()).flat_map(|p| p.to_le_bytes());
             parts.push(("camera", start.camera.model().name().bytes().chain([u8::from(start.is_known())]).chain(params).collect()));
         }
         Ok(Fingerprint::of_parts(parts.iter().map(|(name, bytes)| (*name, bytes.as_slice()))))

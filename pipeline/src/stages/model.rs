@@ -7,7 +7,7 @@ use crate::store::Fingerprint;
 use anyhow::{Context, Result};
 use scene::format::colmap::{ColmapFiles, read_colmap};
 use scene::format::{ColmapModel, write_ply_cloud};
-use scene::{Camera, CameraId, CameraModel, Cloud, Reconstruction, Scale};
+use scene::{Camera, CameraId, CameraModel, Cloud, ImageId, Reconstruction, Scale};
 use std::collections::BTreeSet;
 use std::io::Write;
 
@@ -59,16 +59,40 @@ pub fn save_calibrations(work: &Work<'_>, model: &Reconstruction, list: &ImageLi
     Ok(())
 }
 
-/// The model as COLMAP can hold it: without shear. `None` when it can hold it as it is.
-fn without_shear(model: &Reconstruction) -> Option<Reconstruction> {
+/// Median distance of each camera from the points that it observes; `None` where it observes none.
+fn object_distances(model: &Reconstruction) -> Vec<Option<f64>> {
+    let mut distances = vec![Vec::new(); model.cameras.len()];
+    let centres: Vec<_> = (0..model.images.len()).map(|i| model.cam_from_world(ImageId::new(i)).map(|pose| pose.centre())).collect();
+    for point in &model.points {
+        for o in &point.track {
+            let camera = model.images[o.image.index()].camera.index();
+            distances[camera].extend(centres[o.image.index()].map(|centre| (point.xyz - centre).norm()));
+        }
+    }
+    let median = |mut values: Vec<f64>| {
+        let middle = values.len() / 2;
+        (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    };
+    distances.into_iter().map(median).collect()
+}
+
+/// The model as COLMAP can hold it: without shear, and with cameras of one projection centre in place of those behind a port, which fit at the median
+/// distance of what these see. `None` when it can hold it as it is.
+fn for_colmap(model: &Reconstruction) -> Result<Option<Reconstruction>> {
     let has_shear = |camera: &Camera| camera.model() == CameraModel::Brown && camera.params()[BROWN_SHEAR] != 0.0;
-    model.cameras.iter().any(has_shear).then(|| {
-        let mut model = model.clone();
-        for camera in model.cameras.iter_mut().filter(|camera| has_shear(camera)) {
+    if !model.cameras.iter().any(|camera| has_shear(camera) || camera.port().is_some()) {
+        return Ok(None);
+    }
+    let distances = object_distances(model);
+    let mut model = model.clone();
+    for (camera, distance) in model.cameras.iter_mut().zip(distances) {
+        let at_its_objects = distance.map_or(*camera, |distance| camera.with_object_distance(distance));
+        *camera = at_its_objects.central().context("no camera without a port comes near one behind it: look at its parameters")?;
+        if has_shear(camera) {
             camera.params_mut()[BROWN_SHEAR] = 0.0;
         }
-        model
-    })
+    }
+    Ok(Some(model))
 }
 
 type Writer = fn(&ColmapModel<'_>, &mut dyn Write) -> std::io::Result<()>;
@@ -85,13 +109,13 @@ pub fn save(work: &Work<'_>, model: &Reconstruction, sigmas: &[Option<f64>], fol
 }
 
 /// A model as COLMAP's files and its points as a cloud, by name; `sigmas` of the points, or none. The shear of a camera of Brown's model is
-/// left out: COLMAP's models have none.
+/// left out, and a camera behind a port becomes one without that fits where most of what it sees is: COLMAP's models have neither. `calib/` has them as they are.
 ///
 /// # Errors
 /// When COLMAP cannot hold the model.
 pub fn files(model: &Reconstruction, sigmas: &[Option<f64>]) -> Result<Vec<(&'static str, Vec<u8>)>> {
-    let sheared = without_shear(model);
-    let colmap = ColmapModel::new(sheared.as_ref().unwrap_or(model))?;
+    let changed = for_colmap(model)?;
+    let colmap = ColmapModel::new(changed.as_ref().unwrap_or(model))?;
     let writers: [Writer; 5] = [
         |m, out| m.write_cameras_binary(out),
         |m, out| m.write_rigs_binary(out),

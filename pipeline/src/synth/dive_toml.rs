@@ -1,6 +1,6 @@
 //! The dive.toml of a synthetic dive.
 
-use super::truth::brown;
+use super::truth::{brown, window};
 use nalgebra::Vector3;
 use std::fmt::Write;
 use synthetic::dive::{DiveScene, Pick};
@@ -35,8 +35,15 @@ pub(super) fn dive_toml(dive: &DiveScene) -> String {
         let name = format!("C{}", c + 1);
         let _ = write!(text, "\n[[camera]]\nname = \"{name}\"\nimages = \"frames/{name}\"\n");
         let _ = writeln!(text, "mask = \"truth/masks/{name}/{{stem}}.png\"  # the true masks; [mask] says that they are used");
-        text.push_str("# As a calibration in the water finds it; refined all the same. Without it a guess is the start.\n");
-        let _ = writeln!(text, "interior = {}", brown(&camera.calibrated.camera));
+        let port = window(dive, camera).filter(|_| dive.options.rig.port.known);
+        if let Some(port) = port {
+            text.push_str("# The lens in air, refined, and the window of the housing, as a calibration with the port finds them.\n");
+            let lens = brown(&camera.in_air);
+            let _ = writeln!(text, "interior = {}, port = {port} }}", lens.trim_end_matches(" }"));
+        } else {
+            text.push_str("# As a calibration in the water finds it; refined all the same. Without it a guess is the start.\n");
+            let _ = writeln!(text, "interior = {}", brown(&camera.calibrated.camera));
+        }
     }
     baselines(&mut text, dive);
     if looks_apart(dive) {

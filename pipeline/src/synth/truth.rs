@@ -99,7 +99,9 @@ fn optics(dive: &DiveScene) -> String {
         let _ = writeln!(text, "\n[C{}]\nin_air = {}", c + 1, brown(&camera.in_air));
         let _ = writeln!(text, "calibrated = {}", brown(&camera.calibrated.camera));
         let _ = writeln!(text, "calibrated_rms_px = {:.4}\ncalibrated_max_px = {:.4}", camera.calibrated.rms_px, camera.calibrated.max_px);
-        text.push_str(&window(dive, camera));
+        if let Some(window) = window(dive, camera) {
+            let _ = writeln!(text, "port = {window}");
+        }
     }
     text
 }
@@ -111,12 +113,11 @@ pub(super) fn brown(camera: &scene::Camera) -> String {
     format!("{{ model = \"{}\", {} }}", camera.model().name(), keys.join(", "))
 }
 
-fn window(dive: &DiveScene, camera: &DiveCamera) -> String {
-    match camera.window(dive.refractive_index(0)) {
-        Some(w) if dive.options.rig.port.kind == PortKind::Flat => format!(
-            "port = {{ normal = [{:.8}, {:.8}, {:.8}], distance_m = {}, thickness_m = {}, index_air = {}, index_port = {}, index_water = {:.7} }}\n",
-            w.normal.x, w.normal.y, w.normal.z, w.distance_m, w.thickness_m, w.indices[0], w.indices[1], w.indices[2]
-        ),
-        _ => String::new(),
-    }
+/// The window of a camera as an inline table of dive.toml, if it has one.
+pub(super) fn window(dive: &DiveScene, camera: &DiveCamera) -> Option<String> {
+    let w = camera.window(dive.refractive_index(0)).filter(|_| dive.options.rig.port.kind == PortKind::Flat)?;
+    Some(format!(
+        "{{ normal = [{:.8}, {:.8}, {:.8}], distance_m = {}, thickness_m = {}, index_air = {}, index_port = {}, index_water = {:.7} }}",
+        w.normal.x, w.normal.y, w.normal.z, w.distance_m, w.thickness_m, w.indices[0], w.indices[1], w.indices[2]
+    ))
 }

@@ -102,11 +102,13 @@ pub struct PortOptions {
     pub thickness_mm: f64,
     /// Its refractive index.
     pub index: f64,
+    /// Whether it is known to those who orient the dive: lens in air and window apart. Else they have one Brown model, calibrated in the water.
+    pub known: bool,
 }
 
 impl Default for PortOptions {
     fn default() -> Self {
-        Self { kind: PortKind::Flat, thickness_mm: 8.42, index: 1.491 }
+        Self { kind: PortKind::Flat, thickness_mm: 8.42, index: 1.491, known: false }
     }
 }
 
