@@ -1,4 +1,4 @@
-//! Images in and out: decoding, EXIF, video, colour, resizing and filters.
+//! Images in and out: decoding, EXIF, video, colour, resizing, filters and the measurement of circular targets.
 //!
 //! Every function takes and returns plain values; nothing here knows a path but the video reader, which OpenCV forces to.
 //! Pixels follow [`scene::Raster`]: row-major, the centre of the top-left pixel at (0.5, 0.5). Grey is f32 in 0..=1, colour
@@ -15,6 +15,7 @@ mod hash;
 mod jpeg;
 mod orient;
 mod resize;
+mod target;
 #[cfg(feature = "video")]
 pub mod video;
 
@@ -28,3 +29,4 @@ pub use format::{ImageFormat, ImageInfo};
 pub use hash::{ContentHash, content_hash};
 pub use orient::apply_orientation;
 pub use resize::{resize_area_grey, resize_area_rgb, resize_nearest};
+pub use target::{CircleTarget, NoTarget, measure_circle};
