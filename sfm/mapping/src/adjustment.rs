@@ -12,9 +12,6 @@ use solve::adjust::{
     AdjustOptions, AdjustSummary, CameraBlock, ImageObservation, Loss, ParamPrior, PointBlock, PoseBlock, PosePrior, Problem, adjust,
 };
 
-/// Standard deviation of the end of a scale bar, or of a control point, that somebody or a detector picked in an image, pixels.
-pub(crate) const PICK_SIGMA_PX: f64 = 1.0;
-
 /// Loss of positions, directions and headings: acoustic positions jump by tens of metres, compasses near steel by tens of degrees.
 const SENSOR_LOSS: Loss = Loss::Cauchy { scale_px: 3.0 };
 
@@ -137,7 +134,7 @@ fn build(model: &Model, scope: &Scope, options: &OrientOptions) -> (Problem, Pro
         known.add_to(
             &mut problem,
             |image| sensor_of(model, &map, image),
-            |image, point, pixel| observe(model, &map, image, point, pixel, PICK_SIGMA_PX),
+            |pick, point| observe(model, &map, pick.image, point, pick.pixel.into(), pick.sigma_px),
         );
         known.ties.add_to(&mut problem, model, &map);
     }

@@ -1,7 +1,7 @@
 //! Refuses input that contradicts itself.
 
 use crate::error::MapError;
-use crate::input::{MapInput, RigMode, WorldInput};
+use crate::input::{ImagePick, MapInput, RigMode, WorldInput};
 use nalgebra::{Vector2, Vector3};
 use scene::Rigid3;
 
@@ -75,8 +75,11 @@ impl MapInput {
             if pick.image.index() >= self.images.len() {
                 return bad(format!("a scale bar is picked in image {}, which does not exist", pick.image));
             }
-            if !pick.pixel.iter().all(|v| v.is_finite()) {
-                return bad(format!("a scale bar is picked at no place of image {}", pick.image));
+            if !(pick.pixel.iter().all(|v| v.is_finite()) && are_positive(&[pick.sigma_px])) {
+                return bad(format!(
+                    "a scale bar is picked at no place of image {}, or with a standard deviation that is not positive",
+                    pick.image
+                ));
             }
         }
         self.world.check(self.images.len())?;
@@ -121,7 +124,8 @@ impl WorldInput {
             if !(is_finite(&point.xyz) && are_sigmas(&point.sigma_m)) {
                 return bad(format!("control point {index} is not finite, or its standard deviation not positive"));
             }
-            if point.picks.iter().any(|p| p.image.index() >= images || !p.pixel.iter().all(|v| v.is_finite())) {
+            let is_pick = |p: &ImagePick| p.image.index() < images && p.pixel.iter().all(|v| v.is_finite()) && are_positive(&[p.sigma_px]);
+            if !point.picks.iter().all(is_pick) {
                 return bad(format!("control point {index} is picked in an image that does not exist, or at no place of it"));
             }
         }

@@ -178,7 +178,12 @@ pub struct ImagePick {
     pub image: ImageId,
     /// Where, pixels.
     pub pixel: [f64; 2],
+    /// Standard deviation along each axis of the image, pixels.
+    pub sigma_px: f64,
 }
+
+/// Standard deviation of what somebody picked by eye, pixels.
+pub const PICK_SIGMA_PX: f64 = 1.0;
 
 /// A known length between two points of the scene.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,5 @@
 //! Known lengths: baselines between cameras and scale bars in the scene.
 
-use crate::adjustment::PICK_SIGMA_PX;
 use crate::input::{BaselineInput, ImagePick, RigMode, ScaleBarInput};
 use crate::model::Model;
 use crate::summary::{BaselineReport, ScaleBarReport};
@@ -10,6 +9,9 @@ use scene::{ImageId, Scale, Similarity3};
 use solve::adjust::{Baseline, ImageObservation, PointBlock, Problem, ScaleBar};
 use solve::triangulate::{View, triangulate};
 use std::collections::BTreeMap;
+
+/// Steps of a weighted intersection: two or three are usual.
+const WEIGHTED_STEPS: usize = 10;
 
 /// A known length, by its position in the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,7 +139,7 @@ impl Known {
         &self,
         problem: &mut Problem,
         sensor_of: impl Fn(ImageId) -> Option<(u32, u32)>,
-        observe: impl Fn(ImageId, u32, Vector2<f64>) -> Option<ImageObservation>,
+        observe: impl Fn(&ImagePick, u32) -> Option<ImageObservation>,
     ) {
         for b in &self.baselines {
             if let (Some(a), Some(b_end)) = (sensor_of(b.images.0), sensor_of(b.images.1)) {
@@ -149,7 +151,7 @@ impl Known {
             for (end, start) in bar.ends.iter().zip(bar.start) {
                 let point = problem.points.len() as u32;
                 problem.points.push(PointBlock { xyz: start, free: true });
-                problem.observations.extend(end.iter().filter_map(|pick| observe(pick.image, point, Vector2::from(pick.pixel))));
+                problem.observations.extend(end.iter().filter_map(|pick| observe(pick, point)));
             }
             problem.scale_bars.push(ScaleBar { a: first, b: first + 1, length: bar.length, sigma: bar.sigma });
         }
@@ -190,7 +192,38 @@ pub(crate) fn triangulated(model: &Model, picks: &[ImagePick]) -> Option<Vector3
             View::new(*model.camera(pick.image), &cam_from_world, Vector2::from(pick.pixel))
         })
         .collect();
-    if views.len() < 2 { None } else { triangulate(&views) }
+    let start = if views.len() < 2 { None } else { triangulate(&views) }?;
+    // Where all weigh alike, that was it.
+    let weigh_alike = picks.windows(2).all(|p| p[0].sigma_px == p[1].sigma_px);
+    if weigh_alike { Some(start) } else { Some(weighted(model, picks, start)) }
+}
+
+/// The point of least weighted squares of the pixel errors, from one that is near it: Gauss-Newton.
+fn weighted(model: &Model, picks: &[ImagePick], start: Vector3<f64>) -> Vector3<f64> {
+    let mut xyz = start;
+    for _ in 0..WEIGHTED_STEPS {
+        let (normal, right) = picked_normal(model, picks, &xyz);
+        let Some(factor) = normal.cholesky() else { return start };
+        let step = factor.solve(&right);
+        xyz -= step;
+        if step.norm() <= 1e-12 * xyz.norm() {
+            break;
+        }
+    }
+    if xyz.iter().all(|v| v.is_finite()) { xyz } else { start }
+}
+
+/// Normal equations of a point in its picks.
+fn picked_normal(model: &Model, picks: &[ImagePick], xyz: &Vector3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for pick in picks {
+        let Some(cam_from_world) = model.cam_from_world(pick.image) else { continue };
+        let Some(p) = model.camera(pick.image).project_with_jacobians(&cam_from_world.apply(xyz)) else { continue };
+        let j = p.d_point * cam_from_world.rotation_matrix() / pick.sigma_px;
+        normal += j.transpose() * j;
+        right += j.transpose() * ((p.pixel - Vector2::from(pick.pixel)) / pick.sigma_px);
+    }
+    (normal, right)
 }
 
 /// Both ends of a scale bar.
@@ -269,12 +302,5 @@ fn picked_sigma(model: &Model, bar: &ScaleBarInput, ends: &[Vector3<f64>; 2]) ->
 
 /// Covariance of a point that comes from its picks alone.
 pub(crate) fn picked_covariance(model: &Model, picks: &[ImagePick], xyz: &Vector3<f64>) -> Option<Matrix3<f64>> {
-    let mut normal = Matrix3::zeros();
-    for pick in picks {
-        let Some(cam_from_world) = model.cam_from_world(pick.image) else { continue };
-        let Some(p) = model.camera(pick.image).project_with_jacobians(&cam_from_world.apply(xyz)) else { continue };
-        let j = p.d_point * cam_from_world.rotation_matrix() / PICK_SIGMA_PX;
-        normal += j.transpose() * j;
-    }
-    normal.try_inverse()
+    picked_normal(model, picks, xyz).0.try_inverse()
 }

@@ -40,8 +40,8 @@ mod world_report;
 pub use attempt::Made;
 pub use error::MapError;
 pub use input::{
-    BaselineInput, CameraInput, ControlPointInput, HeadingInput, ImageInput, ImagePick, MapInput, PositionInput, RigInput, RigMode,
-    RigPoseInput, ScaleBarInput, UpInput, WorldInput,
+    BaselineInput, CameraInput, ControlPointInput, HeadingInput, ImageInput, ImagePick, MapInput, PICK_SIGMA_PX, PositionInput, RigInput,
+    RigMode, RigPoseInput, ScaleBarInput, UpInput, WorldInput,
 };
 pub use lengths::LengthId;
 pub use options::{Mapper, OrientOptions};

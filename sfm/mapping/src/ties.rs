@@ -1,6 +1,6 @@
 //! What ties a model to the world: positions, depths and attitudes that instruments measured, and control points.
 
-use crate::adjustment::{PICK_SIGMA_PX, ProblemMap, observe};
+use crate::adjustment::{ProblemMap, observe};
 use crate::input::ControlPointInput;
 use crate::lengths::{move_world, triangulated};
 use crate::model::Model;
@@ -64,7 +64,7 @@ impl Ties {
             let known = &world.control_points[given];
             let point = problem.points.len() as u32;
             problem.points.push(PointBlock { xyz: start, free: true });
-            let picks = known.picks.iter().filter_map(|p| observe(model, map, p.image, point, p.pixel.into(), PICK_SIGMA_PX));
+            let picks = known.picks.iter().filter_map(|p| observe(model, map, p.image, point, p.pixel.into(), p.sigma_px));
             problem.observations.extend(picks);
             problem.control_points.push(ControlPoint { point, xyz: known.xyz, sigma: known.sigma_m });
         }

@@ -1,7 +1,9 @@
 //! Little, nothing, or degenerate: the documented error or result, and never a panic.
 
 use crate::support::{assert_consistent, input, made, noisy, oriented, rig_poses};
-use mapping::{BaselineInput, ImagePick, MapError, MapInput, OrientOptions, Orientation, RigMode, RigPoseInput, ScaleBarInput, orient};
+use mapping::{
+    BaselineInput, ImagePick, MapError, MapInput, OrientOptions, Orientation, PICK_SIGMA_PX, RigMode, RigPoseInput, ScaleBarInput, orient,
+};
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use scene::{Camera, CameraId, CameraModel, ImageId, KeypointIndex, PairConfiguration, Rigid3, Scale};
@@ -147,7 +149,12 @@ fn contradictions_are_refused() {
         assert!(matches!(result, Err(MapError::Inconsistent(_))), "{:?}", result.map(|o| o.summary.notes));
     };
     let length = |length_m, sigma_m| BaselineInput { cameras: (CameraId(0), CameraId(1)), length_m, sigma_m };
-    let pick = |x| vec![ImagePick { image: ImageId(0), pixel: [x, 1.0] }, ImagePick { image: ImageId(2), pixel: [x, 1.0] }];
+    let pick = |x| {
+        vec![
+            ImagePick { image: ImageId(0), pixel: [x, 1.0], sigma_px: PICK_SIGMA_PX },
+            ImagePick { image: ImageId(2), pixel: [x, 1.0], sigma_px: PICK_SIGMA_PX },
+        ]
+    };
     let bar = |x, length_m, sigma_m| ScaleBarInput { ends: [pick(x), pick(9.0)], length_m, sigma_m, check: false };
     refused(&|i| i.keypoints.truncate(1));
     refused(&|i| i.images[1].camera = CameraId(7));
@@ -163,8 +170,10 @@ fn contradictions_are_refused() {
     }
     refused(&|i| i.scale_bars = vec![bar(f64::NAN, 1.0, 0.01)]);
     refused(&|i| {
-        i.scale_bars =
-            vec![ScaleBarInput { ends: [vec![ImagePick { image: ImageId(99), pixel: [1.0; 2] }], pick(1.0)], ..bar(1.0, 1.0, 0.1) }]
+        i.scale_bars = vec![ScaleBarInput {
+            ends: [vec![ImagePick { image: ImageId(99), pixel: [1.0; 2], sigma_px: PICK_SIGMA_PX }], pick(1.0)],
+            ..bar(1.0, 1.0, 0.1)
+        }]
     });
     let pose =
         |t: f64, sigma| Some(RigPoseInput { cam_from_rig: Rigid3::new(UnitQuaternion::identity(), Vector3::new(t, 0.0, 0.0)), sigma });
@@ -234,8 +243,11 @@ fn spoil(s: &Spoilt) -> MapInput {
         let baseline = |&(length_m, sigma_m): &(f64, f64)| BaselineInput { cameras: (CameraId(0), CameraId(1)), length_m, sigma_m };
         input.rig.baselines = s.lengths.iter().map(baseline).collect();
     } else if !input.images.is_empty() {
-        let picks =
-            || (0..input.images.len().min(3)).map(|i| ImagePick { image: ImageId::new(i), pixel: [400.0, 60.0 * i as f64] }).collect();
+        let picks = || {
+            (0..input.images.len().min(3))
+                .map(|i| ImagePick { image: ImageId::new(i), pixel: [400.0, 60.0 * i as f64], sigma_px: PICK_SIGMA_PX })
+                .collect()
+        };
         let bar = |&(length_m, sigma_m): &(f64, f64)| ScaleBarInput { ends: [picks(), picks()], length_m, sigma_m, check: length_m > 1.0 };
         input.scale_bars = s.lengths.iter().map(bar).collect();
     }

@@ -137,3 +137,27 @@ fn a_bar_picked_in_one_image_is_no_length() {
     let out = oriented(&input);
     assert_eq!((out.models[0].scale, out.summary.scale_bars[0].found_m), (Scale::Arbitrary, None));
 }
+
+/// A pick that is said to be poor does not spoil those that were measured well.
+#[test]
+fn picks_weigh_by_their_deviations() {
+    let (made, mut input, _) = loose_stereo();
+    let ends = [Vector3::new(2.0, -0.8, 0.2), Vector3::new(3.6, 0.4, 0.2)];
+    let length_m = (ends[0] - ends[1]).norm();
+    let mut bar = scale_bar(&made.truth, ends, length_m, 0.001, true);
+    bar.ends.iter_mut().flatten().for_each(|pick| pick.sigma_px = 0.2);
+    let found = |bar: &mapping::ScaleBarInput| {
+        let out = oriented(&MapInput { scale_bars: vec![bar.clone()], ..input.clone() });
+        out.summary.scale_bars[0].found_m.expect("picked")
+    };
+    let good = found(&bar);
+    bar.ends[0][0].pixel[0] += 20.0;
+    let spoilt = found(&bar);
+    bar.ends[0][0].sigma_px = 100.0;
+    let weighed = found(&bar);
+    // One of many picks with a weight of 4e-6 moves the end by less than a hundredth of what it did.
+    assert!((weighed - good).abs() < 0.05 * (spoilt - good).abs(), "{good} {spoilt} {weighed}");
+    input.scale_bars = vec![bar];
+    input.scale_bars[0].ends[0][0].sigma_px = 0.0;
+    assert!(matches!(mapping::orient(&input, &mapping::OrientOptions::default()), Err(mapping::MapError::Inconsistent(_))));
+}

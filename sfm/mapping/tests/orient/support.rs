@@ -1,7 +1,8 @@
 //! From surveys to inputs, and what every test asks of a result.
 
 use mapping::{
-    BaselineInput, CameraInput, ImageInput, ImagePick, MapInput, OrientOptions, Orientation, RigPoseInput, ScaleBarInput, orient,
+    BaselineInput, CameraInput, ImageInput, ImagePick, MapInput, OrientOptions, Orientation, PICK_SIGMA_PX, RigPoseInput, ScaleBarInput,
+    orient,
 };
 use nalgebra::Vector3;
 use scene::{Camera, CameraId, Reconstruction};
@@ -95,7 +96,7 @@ pub fn scale_bar(truth: &Reconstruction, ends: [Vector3<f64>; 2], length_m: f64,
             let Some(pixel) = camera.project(&pose.apply(xyz)) else { continue };
             if pixel.x > 0.0 && pixel.y > 0.0 && pixel.x < f64::from(camera.width()) && pixel.y < f64::from(camera.height()) {
                 let pixel = [pixel.x + NOISE_PX * random.normal(), pixel.y + NOISE_PX * random.normal()];
-                out.push(ImagePick { image, pixel });
+                out.push(ImagePick { image, pixel, sigma_px: PICK_SIGMA_PX });
             }
         }
         assert!(out.len() > 2, "an end that {} images show", out.len());

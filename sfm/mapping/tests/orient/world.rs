@@ -1,7 +1,9 @@
 //! Instruments and control points tie a model to the world.
 
 use crate::support::{NOISE_PX, complete, made, noisy, oriented, rig_poses};
-use mapping::{ControlPointInput, HeadingInput, ImagePick, MapInput, Orientation, PositionInput, RigInput, RigMode, UpInput, WorldInput};
+use mapping::{
+    ControlPointInput, HeadingInput, ImagePick, MapInput, Orientation, PICK_SIGMA_PX, PositionInput, RigInput, RigMode, UpInput, WorldInput,
+};
 use nalgebra::Vector3;
 use scene::{Reconstruction, Scale};
 use synthetic::Random;
@@ -54,7 +56,11 @@ fn control(survey: &Survey, place: Vector3<f64>, sigma_m: f64, check: bool, rand
     let picks = nearest.track.iter().map(|o| {
         let camera = &truth.cameras[truth.images[o.image.index()].camera.index()];
         let pixel = camera.project(&truth.cam_from_world(o.image).expect("true").apply(&nearest.xyz)).expect("seen");
-        ImagePick { image: o.image, pixel: [pixel.x + NOISE_PX * random.normal(), pixel.y + NOISE_PX * random.normal()] }
+        ImagePick {
+            image: o.image,
+            pixel: [pixel.x + NOISE_PX * random.normal(), pixel.y + NOISE_PX * random.normal()],
+            sigma_px: PICK_SIGMA_PX,
+        }
     });
     ControlPointInput { picks: picks.collect(), xyz: nearest.xyz + noise(random, sigma_m), sigma_m: Vector3::repeat(sigma_m), check }
 }
