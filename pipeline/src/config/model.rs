@@ -187,6 +187,8 @@ pub struct ScaleBarConfig {
     pub sigma_m: f64,
     /// Only compared, not used.
     pub check: bool,
+    /// Both ends are targets.
+    pub target: Option<TargetConfig>,
     /// Where both ends were picked.
     pub ends: [Vec<PickConfig>; 2],
 }
@@ -238,8 +240,17 @@ pub struct ControlPointConfig {
     pub sigma_m: f64,
     /// Only compared, not used.
     pub check: bool,
+    /// It is a target.
+    pub target: Option<TargetConfig>,
     /// Where it was picked.
     pub picks: Vec<PickConfig>,
+}
+
+/// A circular target, whose centre is measured in each image near where it was picked.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TargetConfig {
+    /// How far from the pick its centre may be, pixels.
+    pub search_radius_px: f64,
 }
 
 /// A point picked in an image.

@@ -127,6 +127,8 @@ pub(super) struct RawScaleBar {
     pub(super) length_m: Place<f64>,
     pub(super) sigma_m: Place<f64>,
     pub(super) check: Place<bool>,
+    pub(super) target: Place<String>,
+    pub(super) search_radius_px: Place<f64>,
     pub(super) endpoints: Place<Vec<Vec<Spanned<RawPick>>>>,
 }
 
@@ -168,6 +170,8 @@ pub(super) struct RawControlPoint {
     pub(super) xyz_m: Place<Vec<f64>>,
     pub(super) sigma_m: Place<f64>,
     pub(super) check: Place<bool>,
+    pub(super) target: Place<String>,
+    pub(super) search_radius_px: Place<f64>,
     pub(super) picks: Option<Vec<Spanned<RawPick>>>,
 }
 

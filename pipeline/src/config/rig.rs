@@ -1,8 +1,8 @@
 //! `[rig]` and `[[scale_bar]]`.
 
 use super::error::{Source, did_you_mean};
-use super::model::{BaselineConfig, CameraConfig, PickConfig, PoseConfig, RigConfig, RigMode, ScaleBarConfig};
-use super::raw::{RawBaseline, RawPick, RawPose, RawRig, RawScaleBar};
+use super::model::{BaselineConfig, CameraConfig, PickConfig, PoseConfig, RigConfig, RigMode, ScaleBarConfig, TargetConfig};
+use super::raw::{Place, RawBaseline, RawPick, RawPose, RawRig, RawScaleBar};
 use super::values::Values;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use scene::Rigid3;
@@ -12,6 +12,8 @@ use toml::Spanned;
 
 /// Standard deviation of a length of which none is given, metres.
 const DEFAULT_SIGMA_M: f64 = 0.001;
+/// How far from a pick the centre of a target may be, pixels, where it is not said.
+const DEFAULT_SEARCH_RADIUS_PX: f64 = 10.0;
 /// Largest deviation of a given rotation matrix from orthonormality, and of a quaternion from length 1.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
@@ -182,6 +184,21 @@ pub(super) fn rotation(values: &mut Values<'_, '_>, key: &str, entry: &Spanned<R
     Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&matrix)))
 }
 
+/// The target at the picks of a table.
+pub(super) fn target(values: &mut Values<'_, '_>, table: &str, kind: &Place<String>, radius: &Place<f64>) -> Option<TargetConfig> {
+    let key = format!("{table}.search_radius_px");
+    let search_radius_px = values.within(&key, radius, 1.0, 100.0, DEFAULT_SEARCH_RADIUS_PX);
+    if let (None, Some(radius)) = (kind, radius) {
+        values.problem_with_hint(
+            radius.span(),
+            &key,
+            "nothing is searched for",
+            "target = \"circle\" measures circular targets at the picks",
+        );
+    }
+    values.choice(&format!("{table}.target"), kind, &[("circle", TargetConfig { search_radius_px })])
+}
+
 /// A point picked in an image.
 pub(super) fn pick(values: &mut Values<'_, '_>, key: &str, entry: &Spanned<RawPick>, cameras: &[CameraConfig]) -> Option<PickConfig> {
     let place = entry.get_ref();
@@ -230,5 +247,6 @@ fn scale_bar(values: &mut Values<'_, '_>, index: usize, entry: &Spanned<RawScale
     }
     let name = bar.name.as_ref().map_or_else(|| format!("bar {}", index + 1), |n| n.get_ref().clone());
     let check = bar.check.as_ref().is_some_and(|c| *c.get_ref());
-    Some(ScaleBarConfig { name, length_m: length_m?, sigma_m, check, ends })
+    let target = target(values, "scale_bar", &bar.target, &bar.search_radius_px);
+    Some(ScaleBarConfig { name, length_m: length_m?, sigma_m, check, target, ends })
 }

@@ -3,7 +3,7 @@
 use super::error::Source;
 use super::model::{CameraConfig, ControlPointConfig, SensorsConfig};
 use super::raw::{RawControlPoint, RawSensors, RawWorld};
-use super::rig::{pick, rotation};
+use super::rig::{pick, rotation, target};
 use super::values::Values;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::path::Path;
@@ -95,5 +95,6 @@ fn control_point(
     }
     let name = point.name.as_ref().map_or_else(|| format!("point {}", index + 1), |n| n.get_ref().clone());
     let check = point.check.as_ref().is_some_and(|c| *c.get_ref());
-    Some(ControlPointConfig { name, xyz_m: xyz_m?, sigma_m, check, picks })
+    let target = target(values, "control_point", &point.target, &point.search_radius_px);
+    Some(ControlPointConfig { name, xyz_m: xyz_m?, sigma_m, check, target, picks })
 }

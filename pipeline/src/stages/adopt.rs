@@ -1,6 +1,6 @@
 //! A model that another program made, as a start for the adjustment: its images are those of dive.toml.
 
-use super::images::{CameraEntry, ImageEntry, ImageList};
+use super::images::{CameraEntry, ImageEntry, ImageList, frame_file};
 use super::interior::{self, Origin, Start};
 use super::model;
 use super::orient::{Found, assemble, options_of};
@@ -10,7 +10,7 @@ use crate::config::{Config, FramesFrom, ImageSource};
 use crate::error::{Misfit, NoResult};
 use crate::formats::write_calibration;
 use crate::store::{Fingerprint, Warning};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use mapping::MapError;
 use scene::{CameraId, Frame, FrameId, Reconstruction, Rig, RigId, RigSensor, Rigid3};
 use serde_json::{Value, json};
@@ -46,14 +46,22 @@ pub fn readjust(config: &Config, given: &Reconstruction) -> Result<Readjusted> {
         point.track.iter().for_each(|o| colours[o.image.index()][o.keypoint.index()] = point.colour);
     }
     let found = Found { keypoints: given.keypoints.clone(), sigmas_px: vec![Vec::new(); given.images.len()], colours, pairs: Vec::new() };
-    let input = assemble(config, &list, &starts, found, &mut warnings)?;
+    let load = |image: &ImageEntry| -> Result<Vec<u8>> {
+        let name = &config.cameras[image.camera].name;
+        let path = match (&config.cameras[image.camera].images, image.position) {
+            (ImageSource::Files(files), Some(position)) => files[position].clone(),
+            _ => config.output.join(frame_file(name, &image.stem)),
+        };
+        std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))
+    };
+    let (input, told) = assemble(config, &list, &starts, found, &load, &mut warnings)?;
     let orientation = match mapping::readjust(&input, &start, &options_of(config)) {
         Ok(orientation) => orientation,
         Err(error @ MapError::Inconsistent(_)) => return Err(NoResult(error.to_string()).into()),
         Err(error) => return Err(error.into()),
     };
     warnings.extend(orientation.summary.notes.iter().map(|note| Warning { about: "orientation".to_owned(), message: note.clone() }));
-    let mut figures = figures(config, &list, &starts, &orientation, &orientation.models[0]);
+    let mut figures = figures(config, &list, &starts, &orientation, &orientation.models[0], &told);
     let told: Vec<Value> = warnings.iter().map(|w| json!({"about": w.about, "message": w.message})).collect();
     figures["warnings"] = told.into();
     let (model, quality) = (&orientation.models[0], orientation.summary.quality.as_ref().ok());

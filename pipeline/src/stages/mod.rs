@@ -16,4 +16,5 @@ mod orient_figures;
 mod page;
 mod pairing;
 pub mod report;
+mod targets;
 mod world;

@@ -3,6 +3,7 @@
 use super::images::{CameraEntry, ImageEntry, ImageList};
 use super::interior::{self, Start};
 use super::orient_figures::{figures, precision_table};
+use super::targets::{Picked, Picker};
 use super::{features, matching, model, world};
 use crate::config::{Config, Mapper, RigMode, ScaleBarConfig};
 use crate::error::NoResult;
@@ -16,7 +17,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "orient", version: 4, upstream: &["ingest", "features", "matching"], options, inputs, work };
+pub const STAGE: Stage = Stage { name: "orient", version: 5, upstream: &["ingest", "features", "matching"], options, inputs, work };
 
 /// Standard deviation of a keypoint's position over its scale: what was found in a coarser image is as much less precise (Zeisl, Georgel,
 /// Schweiger, Steinbach & Navab, *Estimation of location uncertainty for scale invariant feature points*, BMVC 2009). The finest
@@ -56,7 +57,7 @@ fn inputs(config: &Config, hashes: &Hashes) -> BTreeMap<String, String> {
 fn work(work: &Work<'_>) -> Result<Outcome> {
     let list = ImageList::load(work)?;
     let mut warnings = Vec::new();
-    let (input, starts) = input(work, &list, &mut warnings)?;
+    let (input, starts, told) = input(work, &list, &mut warnings)?;
     if work.config.rig.mode == RigMode::None && !work.config.rig.baselines.is_empty() {
         let message = "the baselines are not used: rig.mode is \"none\"".to_owned();
         warnings.push(Warning { about: "dive.toml".to_owned(), message });
@@ -89,7 +90,7 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
         let message = format!("{count} images form a model of their own, which could not be joined to the first: sparse/{i}");
         warnings.push(Warning { about: "orientation".to_owned(), message });
     }
-    Ok(Outcome { figures: figures(work.config, &list, &starts, &orientation, largest), warnings })
+    Ok(Outcome { figures: figures(work.config, &list, &starts, &orientation, largest, &told), warnings })
 }
 
 pub(super) fn options_of(config: &Config) -> OrientOptions {
@@ -112,7 +113,7 @@ pub(super) fn options_of(config: &Config) -> OrientOptions {
     }
 }
 
-fn input(work: &Work<'_>, list: &ImageList, warnings: &mut Vec<Warning>) -> Result<(MapInput, Vec<Start>)> {
+fn input(work: &Work<'_>, list: &ImageList, warnings: &mut Vec<Warning>) -> Result<(MapInput, Vec<Start>, Told)> {
     // Descriptors are dropped image by image: all of them would not fit.
     let found: Vec<(Vec<Keypoint>, Vec<[u8; 3]>)> = list
         .images
@@ -132,7 +133,9 @@ fn input(work: &Work<'_>, list: &ImageList, warnings: &mut Vec<Warning>) -> Resu
         colours,
         pairs,
     };
-    Ok((assemble(work.config, list, &starts, found, warnings)?, starts))
+    let load = |image: &ImageEntry| list.bytes(work, image);
+    let (input, told) = assemble(work.config, list, &starts, found, &load, warnings)?;
+    Ok((input, starts, told))
 }
 
 /// What was found in the images, as `mapping` takes it.
@@ -143,8 +146,25 @@ pub(super) struct Found {
     pub(super) pairs: Vec<VerifiedPair>,
 }
 
-/// What was found in the images, with all that dive.toml knows.
-pub(super) fn assemble(config: &Config, list: &ImageList, starts: &[Start], found: Found, warnings: &mut Vec<Warning>) -> Result<MapInput> {
+/// What the report has beside the result of `mapping`.
+#[derive(Default)]
+pub(super) struct Told {
+    /// Targets at the ends of each scale bar, and of each control point.
+    pub(super) bar_targets: Vec<[Vec<Value>; 2]>,
+    pub(super) control_targets: Vec<Vec<Value>>,
+}
+
+/// What was found in the images, with all that dive.toml knows; `load` reads the file of an image, for the targets that are measured.
+pub(super) fn assemble(
+    config: &Config,
+    list: &ImageList,
+    starts: &[Start],
+    found: Found,
+    load: &(dyn Fn(&ImageEntry) -> Result<Vec<u8>> + Sync),
+    warnings: &mut Vec<Warning>,
+) -> Result<(MapInput, Told)> {
+    let picker = Picker { list, cameras: starts.iter().map(|s| s.camera).collect(), load };
+    let mut told = Told::default();
     let image = |image: &ImageEntry| ImageInput { name: image.name.clone(), camera: CameraId::new(image.camera), exposure: image.exposure };
     let camera = |(s, entry): (&Start, &CameraEntry)| CameraInput {
         name: entry.name.clone(),
@@ -154,7 +174,8 @@ pub(super) fn assemble(config: &Config, list: &ImageList, starts: &[Start], foun
         sigmas: s.sigmas.clone(),
         alternatives: s.alternatives.clone(),
     };
-    Ok(MapInput {
+    let scale_bars = config.scale_bars.iter().map(|bar| scale_bar(bar, &picker, &mut told, warnings)).collect();
+    let input = MapInput {
         cameras: starts.iter().zip(&list.cameras).map(camera).collect(),
         images: list.images.iter().map(image).collect(),
         keypoints: found.keypoints,
@@ -162,9 +183,10 @@ pub(super) fn assemble(config: &Config, list: &ImageList, starts: &[Start], foun
         colours: found.colours,
         pairs: found.pairs,
         rig: rig(config),
-        scale_bars: config.scale_bars.iter().map(|bar| scale_bar(bar, list, warnings)).collect(),
-        world: world::world(config, list, warnings)?,
-    })
+        scale_bars,
+        world: world::world(config, &picker, &mut told, warnings)?,
+    };
+    Ok((input, told))
 }
 
 fn rig(config: &Config) -> RigInput {
@@ -186,7 +208,10 @@ fn rig(config: &Config) -> RigInput {
 }
 
 /// A pick in an image that could not be used is a warning.
-fn scale_bar(bar: &ScaleBarConfig, list: &ImageList, warnings: &mut Vec<Warning>) -> ScaleBarInput {
-    let ends = bar.ends.each_ref().map(|picks| world::picks(picks, &bar.name, list, warnings));
+fn scale_bar(bar: &ScaleBarConfig, picker: &Picker<'_>, told: &mut Told, warnings: &mut Vec<Warning>) -> ScaleBarInput {
+    let [a, b] = bar.ends.each_ref().map(|picks| picker.picks(picks, bar.target.as_ref(), &bar.name, warnings));
+    let (Picked { picks: first, targets: of_first }, Picked { picks: second, targets: of_second }) = (a, b);
+    told.bar_targets.push([of_first, of_second]);
+    let ends = [first, second];
     ScaleBarInput { ends, length_m: bar.length_m, sigma_m: bar.sigma_m, check: bar.check }
 }

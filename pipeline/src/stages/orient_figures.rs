@@ -2,6 +2,7 @@
 
 use super::images::ImageList;
 use super::interior::Start;
+use super::orient::Told;
 use crate::config::Config;
 use mapping::{
     CameraResiduals, ControlPointReport, InstrumentReport, InteriorSigma, LengthId, OrientSummary, Orientation, Quality, RegionResiduals,
@@ -10,7 +11,14 @@ use mapping::{
 use scene::{Camera, CameraId, Reconstruction, Scale};
 use serde_json::{Map, Value, json};
 
-pub(super) fn figures(config: &Config, list: &ImageList, starts: &[Start], orientation: &Orientation, model: &Reconstruction) -> Value {
+pub(super) fn figures(
+    config: &Config,
+    list: &ImageList,
+    starts: &[Start],
+    orientation: &Orientation,
+    model: &Reconstruction,
+    told: &Told,
+) -> Value {
     let summary = &orientation.summary;
     let oriented = model.oriented_images().count();
     let scale = match model.scale {
@@ -25,9 +33,9 @@ pub(super) fn figures(config: &Config, list: &ImageList, starts: &[Start], orien
     json!({
         "oriented": oriented, "points": model.points.len(), "observations": model.observation_count(), "reprojection_rms_px": rms,
         "reprojection_mean_px": model.mean_point_error(), "scale": scale, "cameras": cameras(list, starts, summary, model),
-        "baselines": baselines(list, summary), "scale_bars": scale_bars(config, summary), "models": models, "note": note,
+        "baselines": baselines(list, summary), "scale_bars": scale_bars(config, summary, told), "models": models, "note": note,
         "length_error": length_error(summary), "precision": precision(summary, model), "world": world(summary),
-        "control_points": control_points(config, summary),
+        "control_points": control_points(config, summary, told),
         "mapper": {
             "way": made.map(|m| if m.global { "global" } else { "incremental" }), "reason": made.map(|m| &m.reason),
         },
@@ -84,13 +92,13 @@ fn baselines(list: &ImageList, summary: &OrientSummary) -> Vec<Value> {
     summary.baselines.iter().map(baseline).collect()
 }
 
-fn scale_bars(config: &Config, summary: &OrientSummary) -> Vec<Value> {
+fn scale_bars(config: &Config, summary: &OrientSummary, told: &Told) -> Vec<Value> {
     let bar = |b: &mapping::ScaleBarReport| {
         let (test_value, rejected) = test(summary, LengthId::ScaleBar(b.index));
         json!({
             "name": config.scale_bars[b.index].name, "given_m": b.given_m, "found_m": b.found_m,
             "error_m": b.found_m.map(|found| found - b.given_m), "check": b.check,
-            "normalised_residual": b.normalised_residual.or(test_value), "rejected": rejected,
+            "normalised_residual": b.normalised_residual.or(test_value), "rejected": rejected, "targets": told.bar_targets[b.index],
         })
     };
     summary.scale_bars.iter().map(bar).collect()
@@ -109,11 +117,11 @@ fn world(summary: &OrientSummary) -> Value {
     })
 }
 
-fn control_points(config: &Config, summary: &OrientSummary) -> Vec<Value> {
+fn control_points(config: &Config, summary: &OrientSummary, told: &Told) -> Vec<Value> {
     let point = |p: &ControlPointReport| {
         json!({
             "name": config.control_points[p.index].name, "error_m": p.error_m.map(|e| [e.x, e.y, e.z]),
-            "normalised_residual": p.normalised_residual, "check": p.check,
+            "normalised_residual": p.normalised_residual, "check": p.check, "targets": told.control_targets[p.index],
         })
     };
     summary.world.iter().flat_map(|w| &w.control_points).map(point).collect()

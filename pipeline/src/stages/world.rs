@@ -1,21 +1,23 @@
 //! What the vehicle's sensors and control points say of the world.
 
 use super::images::ImageList;
-use crate::config::{Config, MAX_FROM_ORIGIN_M, PickConfig, SensorsConfig};
+use super::orient::Told;
+use super::targets::Picker;
+use crate::config::{Config, MAX_FROM_ORIGIN_M, SensorsConfig};
 use crate::error::Misfit;
 use crate::sensor_log::{SensorLog, at_instants, read_sensor_log};
 use crate::store::Warning;
 use anyhow::Result;
-use mapping::{ControlPointInput, HeadingInput, ImagePick, PositionInput, UpInput, WorldInput};
+use mapping::{ControlPointInput, HeadingInput, PositionInput, UpInput, WorldInput};
 use nalgebra::Vector3;
-use scene::ImageId;
 use std::collections::BTreeMap;
 
 /// Reads the log and brings it to the exposures.
 ///
 /// # Errors
 /// When the log cannot be read, or does not fit the images.
-pub(super) fn world(config: &Config, list: &ImageList, warnings: &mut Vec<Warning>) -> Result<WorldInput> {
+pub(super) fn world(config: &Config, picker: &Picker<'_>, told: &mut Told, warnings: &mut Vec<Warning>) -> Result<WorldInput> {
+    let list = picker.list;
     let origin = Vector3::from(config.origin_m);
     let mut world = WorldInput::default();
     if let Some(sensors) = &config.sensors {
@@ -37,33 +39,13 @@ pub(super) fn world(config: &Config, list: &ImageList, warnings: &mut Vec<Warnin
             return Err(Misfit(message).into());
         }
     }
-    world.control_points = config
-        .control_points
-        .iter()
-        .map(|p| ControlPointInput {
-            picks: picks(&p.picks, &p.name, list, warnings),
-            xyz: Vector3::from(p.xyz_m) - origin,
-            sigma_m: Vector3::repeat(p.sigma_m),
-            check: p.check,
-        })
-        .collect();
+    for point in &config.control_points {
+        let picked = picker.picks(&point.picks, point.target.as_ref(), &point.name, warnings);
+        told.control_targets.push(picked.targets);
+        let (xyz, sigma_m) = (Vector3::from(point.xyz_m) - origin, Vector3::repeat(point.sigma_m));
+        world.control_points.push(ControlPointInput { picks: picked.picks, xyz, sigma_m, check: point.check });
+    }
     Ok(world)
-}
-
-/// Picks in images that are there; the others are warnings.
-pub(super) fn picks(picks: &[PickConfig], about: &str, list: &ImageList, warnings: &mut Vec<Warning>) -> Vec<ImagePick> {
-    let (mut found, mut missing) = (Vec::with_capacity(picks.len()), Vec::new());
-    for pick in picks {
-        match list.images.iter().position(|i| i.name == pick.image) {
-            Some(i) => found.push(ImagePick { image: ImageId::new(i), pixel: [pick.x, pick.y] }),
-            None => missing.push(pick.image.as_str()),
-        }
-    }
-    if !missing.is_empty() {
-        let message = format!("{} of {} picks are not used: there is no usable image {}", missing.len(), picks.len(), missing.join(", "));
-        warnings.push(Warning { about: about.to_owned(), message });
-    }
-    found
 }
 
 /// Time in the log of each exposure, by time.
