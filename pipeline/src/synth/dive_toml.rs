@@ -3,7 +3,8 @@
 use super::truth::{brown, window};
 use nalgebra::Vector3;
 use std::fmt::Write;
-use synthetic::dive::{DiveScene, Pick};
+use synthetic::dive::{DiveScene, PICK_SIGMA_PX, Pick};
+use synthetic::world::Bar;
 
 /// Standard deviation of the given baselines, metres: as of a rig measured in a pool.
 const BASELINE_SIGMA_M: f64 = 0.0005;
@@ -17,7 +18,7 @@ const DEPTH_SIGMA_M: f64 = 0.05;
 const TILT_SIGMA_DEG: f64 = 0.5;
 const HEADING_SIGMA_DEG: f64 = 3.0;
 /// Picks of each end of a bar.
-const PICKS: usize = 6;
+const PICKS: usize = 12;
 
 const HEAD: &str = "\
 # Written by `sfm synth`: a rendered dive, whose truth lies beside it in truth/.
@@ -52,15 +53,23 @@ pub(super) fn dive_toml(dive: &DiveScene) -> String {
     sensors(&mut text, dive);
     let count = dive.world.bars.len();
     for (i, bar) in dive.world.bars.iter().enumerate() {
-        let ends = bar.ends.map(|end| picks(dive, &end));
+        let ends = [0, 1].map(|end| picks(dive, bar, end));
         if ends.iter().any(|picks| picks.len() < 2) {
             continue;
         }
         // The last one is held out.
         let check = i + 1 == count;
         let word = if check { "held out: only compared with what is found" } else { "takes part in the adjustment" };
-        let _ = write!(text, "\n# A known length in the scene, {word}. Its ends were picked by hand, to 0.3 px.\n[[scale_bar]]\n");
-        let _ = write!(text, "name = \"{}\"\nlength_m = {:.6}\nsigma_m = {BAR_SIGMA_M}\ncheck = {check}\n", bar.name, bar.length_m());
+        let _ = write!(
+            text,
+            "\n# A known length in the scene, {word}. Its ends were pointed at by hand, to {PICK_SIGMA_PX} px; the targets there are measured.\n[[scale_bar]]\n"
+        );
+        let _ = write!(
+            text,
+            "name = \"{}\"\nlength_m = {:.6}\nsigma_m = {BAR_SIGMA_M}\ncheck = {check}\ntarget = \"circle\"\n",
+            bar.name,
+            bar.length_m()
+        );
         text.push_str("endpoints = [\n");
         for end in ends {
             text.push_str("    [\n");
@@ -155,10 +164,10 @@ fn mounting(text: &mut String, dive: &DiveScene) {
     text.push('\n');
 }
 
-/// A few picks of the nearest frames, spread evenly over them: people pick where they see well.
-fn picks(dive: &DiveScene, point: &Vector3<f64>) -> Vec<Pick> {
-    let mut all = dive.picks(point);
-    all.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+/// A few picks of the frames that show a target largest, spread evenly over them: people pick where they see well.
+fn picks(dive: &DiveScene, bar: &Bar, end: usize) -> Vec<Pick> {
+    let mut all = dive.picks(bar, end);
+    all.sort_by(|a, b| b.width_px.total_cmp(&a.width_px));
     all.truncate(3 * PICKS);
     all.sort_by_key(|pick| (pick.camera, pick.exposure));
     let count = all.len().min(PICKS);

@@ -50,9 +50,10 @@ fn ground(options: &WorldOptions, covered: Option<[f64; 4]>, clear_m: f64) -> Ve
 
 fn add_bars(world: &mut World, bars: [(&'static str, [f64; 3], usize, f64); 2]) {
     for (name, end, axis, length_m) in bars {
-        let (bar, part) = bar(name, end, axis, length_m);
-        world.bars.push(bar);
-        world.parts.push(part);
+        let built = bar(name, end, axis, length_m, world.panels.len());
+        world.bars.push(built.bar);
+        world.parts.extend(built.parts);
+        world.panels.extend(built.panels);
     }
 }
 

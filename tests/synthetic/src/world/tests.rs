@@ -71,22 +71,28 @@ fn every_scene_has_a_surface_and_the_same_on_one_and_two_threads() {
 }
 
 #[test]
-fn bars_have_their_lengths_and_their_ends_lie_on_them() {
+fn bars_have_their_lengths_between_the_centres_of_their_targets() {
     for kind in [SceneKind::Reef, SceneKind::Hull, SceneKind::Pipeline] {
         let world = scene(kind);
         let lengths: Vec<f64> = world.bars.iter().map(Bar::length_m).collect();
         assert!((lengths[0] - 1.0).abs() < 1e-12 && (lengths[1] - 0.825_222).abs() < 1e-12, "{lengths:?}");
-        for bar in &world.bars {
-            let part = world.parts.iter().find(|p| p.name == bar.name).expect("the bar is a part");
-            for end in &bar.ends {
-                let (low, high) = part
-                    .mesh
-                    .vertices
-                    .iter()
-                    .fold((Vector3::repeat(9.0), Vector3::repeat(-9.0)), |(l, h), v| (l.inf(&v.coords), h.sup(&v.coords)));
-                assert!((0..3).all(|k| end[k] >= low[k] - 1e-12 && end[k] <= high[k] + 1e-12));
-                assert!((end.y - low.y).abs() < 1e-12, "the end is on the side that cameras come from");
+        let targets: Vec<&Part> = world.parts.iter().filter(|p| p.name == "target").collect();
+        let ends = world.bars.iter().flat_map(|bar| bar.ends.map(|end| (bar, end)));
+        assert_eq!(targets.len(), 4);
+        for ((bar, end), part) in ends.zip(targets) {
+            let Material::Panel(index) = part.material else { panic!("a target is printed") };
+            let panel = &world.panels[index];
+            let grey = |p: Vector3<f64>| panel.albedo((p - panel.origin).dot(&panel.u), (p - panel.origin).dot(&panel.v), 1e-4);
+            // The front of the plate goes through the end, and what is printed there is a disc about it.
+            let front = part.mesh.vertices.iter().map(|v| (v.coords - end).dot(&bar.normal)).fold(f64::NEG_INFINITY, f64::max);
+            assert!(front.abs() < 1e-12, "{kind:?} {}: {front}", bar.name);
+            for direction in bar.target_axes().into_iter().flat_map(|a| [a, -a]) {
+                assert!(
+                    grey(end + direction * (0.98 * bar.target_radius_m)) < 0.1
+                        && grey(end + direction * (1.02 * bar.target_radius_m)) > 0.8
+                );
             }
+            assert!(bar.normal.y < -0.5, "targets face where cameras come from");
         }
     }
 }
