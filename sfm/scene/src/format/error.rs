@@ -37,6 +37,16 @@ pub enum FormatError {
         /// What is wrong.
         what: String,
     },
+    /// A key of a JSON file is not what the format says.
+    #[error("{file}, {key}: {what}")]
+    Key {
+        /// Kind or name of the file.
+        file: &'static str,
+        /// Path of the key.
+        key: String,
+        /// What is wrong.
+        what: String,
+    },
     /// The value has no form in the format.
     #[error("cannot be written as {format}: {what}")]
     NotRepresentable {

@@ -13,9 +13,9 @@ pub mod ply;
 #[cfg(test)]
 mod testing;
 
-pub use bundler::write_bundler;
+pub use bundler::{read_bundler, write_bundler};
 pub use colmap::{ColmapModel, read_colmap_binary, read_colmap_model, read_colmap_text, write_colmap_binary, write_colmap_text};
 pub use error::FormatError;
-pub use nerfstudio::write_nerfstudio;
+pub use nerfstudio::{read_nerfstudio, write_nerfstudio};
 pub use obj::read_obj_mesh;
 pub use ply::{Dropped, read_ply_cloud, read_ply_mesh, write_ply_cloud, write_ply_mesh};

@@ -1,11 +1,14 @@
 //! `transforms.json`, as nerfstudio and the programs after it read cameras.
 
 use super::error::FormatError;
-use crate::{Camera, CameraModel, ImageId, Reconstruction};
+use crate::{Camera, CameraId, CameraModel, Frame, FrameId, Image, ImageId, Reconstruction, Rig, RigId, Rigid3, Scale};
+use nalgebra::{Matrix3, Vector3};
 use serde_json::{Map, Value, json};
 use std::io::Write;
 
 const FORMAT: &str = "transforms.json";
+/// Largest deviation of a rotation matrix from orthonormality.
+const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Writes the oriented images, each with its own interior orientation and its pose as `transform_matrix`: world from camera, whose axes are
 /// those of OpenGL (x right, y up, z backward). The world stays as it is. The centre of the top-left pixel is (0.5, 0.5) there too.
@@ -65,11 +68,144 @@ fn interior(camera: &Camera) -> Option<Map<String, Value>> {
     Some(keys)
 }
 
+/// Reads `transforms.json`: cameras with their poses, without points, which the format lacks; `applied_transform` and `ply_file_path` are
+/// passed over. Interior orientation stands with each frame or above all; images with the same one share a camera. The unit is open.
+///
+/// # Errors
+/// [`FormatError::Key`] where a key is missing or is not what the format says, or a camera has no form here.
+pub fn read_nerfstudio(text: &[u8]) -> Result<Reconstruction, FormatError> {
+    let file: Value = serde_json::from_slice(text).map_err(|e| wrong(format!("line {}", e.line()), format!("is not JSON: {e}")))?;
+    let frames = file["frames"].as_array().ok_or_else(|| wrong("frames", "is missing or no list"))?;
+    let mut model = Reconstruction {
+        cameras: Vec::new(),
+        rigs: Vec::new(),
+        frames: Vec::new(),
+        images: Vec::new(),
+        keypoints: vec![Vec::new(); frames.len()],
+        points: Vec::new(),
+        scale: Scale::Arbitrary,
+    };
+    for (i, frame) in frames.iter().enumerate() {
+        let entry = Entry { index: i, frame, file: &file };
+        let name = frame["file_path"].as_str().ok_or_else(|| entry.wrong("file_path", "is missing or no text"))?;
+        let camera = entry.camera()?;
+        let number = model.cameras.iter().position(|c| *c == camera).unwrap_or_else(|| {
+            model.rigs.push(Rig::single(CameraId::new(model.cameras.len())));
+            model.cameras.push(camera);
+            model.cameras.len() - 1
+        });
+        model.frames.push(Frame { rig: RigId::new(number), exposure: i as u32, rig_from_world: Some(entry.cam_from_world()?) });
+        model.images.push(Image { name: name.to_owned(), camera: CameraId::new(number), frame: FrameId::new(i) });
+    }
+    Ok(model)
+}
+
+fn wrong(key: impl Into<String>, what: impl Into<String>) -> FormatError {
+    FormatError::Key { file: FORMAT, key: key.into(), what: what.into() }
+}
+
+/// A frame of the file.
+struct Entry<'a> {
+    index: usize,
+    frame: &'a Value,
+    file: &'a Value,
+}
+
+impl Entry<'_> {
+    fn wrong(&self, key: &str, what: impl Into<String>) -> FormatError {
+        wrong(format!("frames[{}].{key}", self.index), what)
+    }
+
+    /// A value of the frame, or of all.
+    fn value(&self, key: &str) -> &Value {
+        if self.frame[key].is_null() { &self.file[key] } else { &self.frame[key] }
+    }
+
+    fn number(&self, key: &str) -> Result<Option<f64>, FormatError> {
+        match self.value(key) {
+            Value::Null => Ok(None),
+            value => value.as_f64().map(Some).ok_or_else(|| self.wrong(key, "is no number")),
+        }
+    }
+
+    fn needed(&self, key: &str) -> Result<f64, FormatError> {
+        self.number(key)?.ok_or_else(|| self.wrong(key, "is missing, here and above the frames"))
+    }
+
+    fn camera(&self) -> Result<Camera, FormatError> {
+        let size = |key| -> Result<u32, FormatError> {
+            let pixels = self.needed(key)?;
+            // A size is a whole number, which a float of the format may hold.
+            if pixels >= 1.0 && pixels <= f64::from(u32::MAX) && pixels.fract() == 0.0 {
+                Ok(pixels as u32)
+            } else {
+                Err(self.wrong(key, "is no size"))
+            }
+        };
+        let (w, h) = (size("w")?, size("h")?);
+        let fx = match (self.number("fl_x")?, self.number("camera_angle_x")?) {
+            (Some(f), _) => f,
+            (None, Some(angle)) => 0.5 * f64::from(w) / (0.5 * angle).tan(),
+            (None, None) => return Err(self.wrong("fl_x", "is missing, here and above the frames")),
+        };
+        let fy = self.number("fl_y")?.unwrap_or(fx);
+        let (cx, cy) = (self.number("cx")?.unwrap_or(f64::from(w) / 2.0), self.number("cy")?.unwrap_or(f64::from(h) / 2.0));
+        let mut k = [0.0; 4];
+        for (value, key) in k.iter_mut().zip(["k1", "k2", "k3", "k4"]) {
+            *value = self.number(key)?.unwrap_or(0.0);
+        }
+        let [p1, p2] = [self.number("p1")?.unwrap_or(0.0), self.number("p2")?.unwrap_or(0.0)];
+        let model = self.value("camera_model").as_str().unwrap_or("OPENCV");
+        let camera = match model {
+            "OPENCV_FISHEYE" => Camera::new(CameraModel::Fisheye, w, h, &[fx, fy, cx, cy, k[0], k[1], k[2], k[3]]),
+            "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "perspective" if k[3] != 0.0 => {
+                return Err(self.wrong("k4", "a fourth radial term has no form here"));
+            }
+            "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "perspective" if k[2] != 0.0 && fx != fy => {
+                return Err(self.wrong("k3", "a third radial term with two focal lengths has no form here"));
+            }
+            // Brown's B1 and B2 are OpenCV's p2 and p1.
+            "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "perspective" if k[2] != 0.0 => {
+                Camera::new(CameraModel::Brown, w, h, &[fx, cx, cy, k[0], k[1], k[2], p2, p1, 0.0, 0.0])
+            }
+            "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "perspective" if k[..2] == [0.0; 2] && p1 == 0.0 && p2 == 0.0 => {
+                Camera::new(CameraModel::Pinhole, w, h, &[fx, fy, cx, cy])
+            }
+            "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "perspective" => {
+                Camera::new(CameraModel::OpenCv, w, h, &[fx, fy, cx, cy, k[0], k[1], p1, p2])
+            }
+            other => {
+                return Err(self.wrong("camera_model", format!("\"{other}\" has no form here: OPENCV, OPENCV_FISHEYE and PINHOLE have")));
+            }
+        };
+        camera.map_err(|e| self.wrong("fl_x", e.to_string()))
+    }
+
+    fn cam_from_world(&self) -> Result<Rigid3, FormatError> {
+        let key = "transform_matrix";
+        let rows = self.frame[key].as_array().filter(|rows| rows.len() == 3 || rows.len() == 4);
+        let mut m = [[0.0; 4]; 3];
+        for (row, values) in m.iter_mut().zip(rows.ok_or_else(|| self.wrong(key, "is missing, or has not four rows"))?) {
+            for (k, value) in row.iter_mut().enumerate() {
+                *value = values[k].as_f64().ok_or_else(|| self.wrong(key, "needs rows of four numbers"))?;
+            }
+        }
+        // Columns: the axes of the camera in the world, y and z turned round.
+        let world_from_cam = Matrix3::from_fn(|row, column| if column == 0 { m[row][0] } else { -m[row][column] });
+        if (world_from_cam * world_from_cam.transpose() - Matrix3::identity()).norm() > ROTATION_TOLERANCE
+            || world_from_cam.determinant() < 0.0
+        {
+            return Err(self.wrong(key, "is no rotation with a translation"));
+        }
+        Ok(Rigid3::from_matrix(&world_from_cam, Vector3::new(m[0][3], m[1][3], m[2][3])).inverse())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::format::testing::one_image;
-    use nalgebra::{Matrix4, Vector3};
+    use nalgebra::Matrix4;
 
     fn written(camera: Camera) -> Result<Value, FormatError> {
         let mut bytes = Vec::new();
@@ -118,7 +254,48 @@ mod tests {
                 let theirs = project(frame, &point.xyz);
                 assert!((ours.x - theirs[0]).abs() < 1e-9 && (ours.y - theirs[1]).abs() < 1e-9, "{model:?}: {ours:?}, {theirs:?}");
             }
+            // What is read from it sees the points where they were.
+            let back = read_nerfstudio(file.to_string().as_bytes()).expect("valid");
+            assert_eq!((back.images.len(), back.images[0].name.as_str(), back.points.len()), (1, "C1/1.jpg", 0));
+            let found = back.cam_from_world(ImageId(0)).expect("oriented");
+            for point in &truth.points {
+                let given = camera.project(&pose.apply(&point.xyz)).expect("in front");
+                let read = back.cameras[0].project(&found.apply(&point.xyz)).expect("in front");
+                assert!((given - read).norm() < 1e-9, "{model:?}: {given:?} {read:?}");
+            }
         }
+    }
+
+    #[test]
+    fn broken_files_are_named_by_their_keys() {
+        let camera = Camera::new(CameraModel::Pinhole, 640, 480, &[500.0, 510.0, 321.0, 239.0]).expect("valid");
+        let whole = written(camera).expect("has a form");
+        let refused = |change: &dyn Fn(&mut Value)| {
+            let mut file = whole.clone();
+            change(&mut file);
+            read_nerfstudio(file.to_string().as_bytes()).expect_err("broken").to_string()
+        };
+        assert_eq!(refused(&|f| f["frames"] = json!(1)), "transforms.json, frames: is missing or no list");
+        assert_eq!(refused(&|f| f["frames"][0]["w"] = json!(12.5)), "transforms.json, frames[0].w: is no size");
+        assert_eq!(refused(&|f| f["frames"][0]["fl_x"] = json!("x")), "transforms.json, frames[0].fl_x: is no number");
+        assert!(
+            refused(&|f| f["frames"][0]["camera_model"] = json!("EQUIRECTANGULAR")).contains("frames[0].camera_model: \"EQUIRECTANGULAR\"")
+        );
+        assert!(refused(&|f| f["frames"][0]["k4"] = json!(0.1)).contains("frames[0].k4: a fourth radial term"));
+        assert!(refused(&|f| f["frames"][0]["transform_matrix"][0][0] = json!(3.0)).contains("transform_matrix: is no rotation"));
+        assert!(
+            refused(&|f| f["frames"][0]["transform_matrix"][2] = json!([1.0])).contains("transform_matrix: needs rows of four numbers")
+        );
+        assert!(read_nerfstudio(b"{\n\"frames\": [").expect_err("cut").to_string().contains("line 2: is not JSON"));
+        // Above all frames, with an angle in the place of a focal length.
+        let mut above = whole.clone();
+        for key in ["fl_x", "fl_y", "w", "h", "cx", "cy", "camera_model"] {
+            above["frames"][0].as_object_mut().expect("a frame").remove(key);
+        }
+        above["camera_angle_x"] = json!(2.0 * (320.0f64 / 500.0).atan());
+        (above["w"], above["h"]) = (json!(640), json!(480));
+        let found = read_nerfstudio(above.to_string().as_bytes()).expect("valid").cameras[0];
+        assert!(found.params().iter().zip([500.0, 500.0, 320.0, 240.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
     }
 
     #[test]
