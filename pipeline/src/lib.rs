@@ -8,6 +8,7 @@ pub mod clock;
 pub mod config;
 pub mod error;
 pub mod figures;
+pub mod foreign;
 pub mod formats;
 pub mod init;
 pub mod labels;

@@ -291,7 +291,7 @@ pub struct OrientArgs {
     /// The configuration: its cameras name the images of the model.
     #[arg(default_value = "dive.toml")]
     pub dive: PathBuf,
-    /// Folder of the COLMAP model, binary or text.
+    /// The model: folder of COLMAP files (binary or text), or Bundler's bundle.out with list.txt beside it.
     #[arg(long, value_name = "MODEL")]
     pub from: PathBuf,
     /// Folder for the adjusted model, new or empty [default: adjusted, in the output folder].
@@ -308,7 +308,7 @@ pub struct OrientArgs {
 /// Arguments of `sfm export`.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// Folder of the COLMAP model, binary or text: `sparse` in the output of a run.
+    /// The model: folder of COLMAP files (`sparse` in the output of a run), transforms.json, or bundle.out with list.txt beside it.
     pub model: PathBuf,
     /// The form.
     #[arg(long, value_enum)]

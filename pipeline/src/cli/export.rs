@@ -2,13 +2,16 @@
 
 use super::args::{ExportArgs, ExportFormat};
 use super::dispatch::require_empty;
+use crate::foreign::{read_model, size_of_file};
 use anyhow::{Context, Result};
-use scene::format::{read_colmap_model, write_bundler, write_colmap_text, write_nerfstudio};
+use scene::format::{write_bundler, write_colmap_text, write_nerfstudio};
 use std::path::Path;
 
 pub(super) fn export(args: &ExportArgs) -> Result<()> {
     let named = |path: &Path| path.display().to_string();
-    let model = read_colmap_model(&args.model).with_context(|| named(&args.model))?;
+    // Names of a Bundler list are paths from where it lies.
+    let size_of = |name: &str| size_of_file(&args.model.with_file_name(name));
+    let model = read_model(&args.model, &size_of)?;
     require_empty(&args.out)?;
     // Whole in memory first: a model that has no form in the format leaves no file.
     let mut files: Vec<(&str, Vec<u8>)> = Vec::new();

@@ -4,15 +4,15 @@ use super::args::OrientArgs;
 use super::dispatch::{print, require_empty, start_threads};
 use super::summary::summary;
 use crate::config;
-use crate::stages::adopt::readjust;
+use crate::foreign::read_model;
+use crate::stages::adopt::{readjust, size_in_dive};
 use anyhow::{Context, Result};
-use scene::format::read_colmap_model;
 use serde_json::json;
 
 pub(super) fn orient(args: &OrientArgs) -> Result<()> {
     start_threads(args.threads)?;
     let config = config::read(&args.dive)?;
-    let model = read_colmap_model(&args.from).with_context(|| args.from.display().to_string())?;
+    let model = read_model(&args.from, &|name| size_in_dive(&config, name))?;
     let out = args.out.clone().unwrap_or_else(|| config.output.join("adjusted"));
     require_empty(&out)?;
     let done = readjust(&config, &model)?;

@@ -8,6 +8,7 @@ use super::orient_figures::{figures, precision_table};
 use super::pairing::{Exposure, pair_up};
 use crate::config::{Config, FramesFrom, ImageSource};
 use crate::error::{Misfit, NoResult};
+use crate::foreign::size_of_file;
 use crate::formats::write_calibration;
 use crate::store::{Fingerprint, Warning};
 use anyhow::{Context, Result};
@@ -33,6 +34,11 @@ pub struct Readjusted {
 /// # Errors
 /// When the model does not belong to the images of dive.toml, or nothing of it is left.
 pub fn readjust(config: &Config, given: &Reconstruction) -> Result<Readjusted> {
+    if given.points.is_empty() {
+        let message = "the model has no points, so that there is nothing to adjust: transforms.json holds cameras only\n  \
+                       hint: orient the images with `sfm run`, or give a COLMAP or Bundler model";
+        return Err(Misfit(message.to_owned()).into());
+    }
     let mut warnings = Vec::new();
     let places = given.images.iter().map(|image| place_of(config, &image.name)).collect::<Result<Vec<_>>>()?;
     let cameras = cameras_of(config, given, &places)?;
@@ -73,6 +79,16 @@ pub fn readjust(config: &Config, given: &Reconstruction) -> Result<Readjusted> {
         calibrations.map(|(camera, entry)| (model::calibration_file(&entry.name), write_calibration(camera, &entry.name).into_bytes())),
     );
     Ok(Readjusted { files, figures, warnings })
+}
+
+/// Width and height of the image of dive.toml that a model calls by a name; `None` where it is none or no file that can be read.
+#[must_use]
+pub fn size_in_dive(config: &Config, name: &str) -> Option<(u32, u32)> {
+    let (camera, position) = place_of(config, name).ok()?;
+    match &config.cameras[camera].images {
+        ImageSource::Files(files) => size_of_file(&files[position]),
+        ImageSource::Video { .. } => None,
+    }
 }
 
 /// The model's interior orientation, where dive.toml gives none.
