@@ -117,7 +117,7 @@ fn bad_options_exit_with_2_and_a_hint() {
         (["--size", "0x600"], "from 64 to 8192"),
         (["--noise", "nan"], "from 0 to 100"),
         (["--water", "tea"], "clear, coastal, turbid, none"),
-        (["--port", "round"], "flat, none"),
+        (["--port", "round"], "flat, known, none"),
         (["--preset", "moon"], "demo, survey, calibration, tank"),
     ];
     for (options, hint) in bad {

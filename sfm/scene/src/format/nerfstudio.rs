@@ -29,9 +29,7 @@ fn frame(reconstruction: &Reconstruction, image: ImageId) -> Result<Value, Forma
     let entry = &reconstruction.images[image.index()];
     let pose = reconstruction.cam_from_world(image).ok_or_else(|| refuse(format!("image {} has no pose", entry.name)))?;
     let camera = &reconstruction.cameras[entry.camera.index()];
-    let mut frame = interior(camera).ok_or_else(|| {
-        refuse(format!("the camera of {} stands behind a port, or has affinity or shear (C1, C2): without a port, orient with fixed = [\"c1\", \"c2\"]", entry.name))
-    })?;
+    let mut frame = interior(camera).map_err(|why| refuse(format!("the camera of {} {why}", entry.name)))?;
     let (r, c) = (pose.rotation_matrix(), pose.centre());
     // Columns: the axes of the camera in the world, y and z turned round.
     let mut matrix: Vec<Vec<f64>> = (0..3).map(|k| vec![r[(0, k)], -r[(1, k)], -r[(2, k)], c[k]]).collect();
@@ -41,11 +39,11 @@ fn frame(reconstruction: &Reconstruction, image: ImageId) -> Result<Value, Forma
     Ok(frame.into())
 }
 
-/// Keys of the interior orientation; `None` where the format has no such camera.
-fn interior(camera: &Camera) -> Option<Map<String, Value>> {
+/// Keys of the interior orientation; else why the format has no such camera.
+fn interior(camera: &Camera) -> Result<Map<String, Value>, &'static str> {
     let p = camera.params();
     if camera.port().is_some() {
-        return None;
+        return Err("stands behind a port");
     }
     let (model, focal, centre, names, distortion): (_, _, _, &[&str], Vec<f64>) = match camera.model() {
         CameraModel::Pinhole => ("OPENCV", [p[0], p[1]], [p[2], p[3]], &[], Vec::new()),
@@ -57,7 +55,7 @@ fn interior(camera: &Camera) -> Option<Map<String, Value>> {
         CameraModel::Brown if p[8] == 0.0 && p[9] == 0.0 => {
             ("OPENCV", [p[0], p[0]], [p[1], p[2]], &["k1", "k2", "k3", "p1", "p2"], vec![p[3], p[4], p[5], p[7], p[6]])
         }
-        CameraModel::Brown => return None,
+        CameraModel::Brown => return Err("has affinity or shear (C1, C2): orient with fixed = [\"c1\", \"c2\"]"),
     };
     let mut keys = Map::new();
     keys.insert("camera_model".to_owned(), model.into());
@@ -65,7 +63,7 @@ fn interior(camera: &Camera) -> Option<Map<String, Value>> {
     keys.insert("h".to_owned(), camera.height().into());
     let values = ["fl_x", "fl_y", "cx", "cy"].into_iter().zip(focal.into_iter().chain(centre));
     keys.extend(values.chain(names.iter().copied().zip(distortion)).map(|(name, value)| (name.to_owned(), json!(value))));
-    Some(keys)
+    Ok(keys)
 }
 
 /// Reads `transforms.json`: cameras with their poses, without points, which the format lacks; `applied_transform` and `ply_file_path` are
@@ -302,5 +300,17 @@ mod tests {
     fn what_has_no_form_is_refused() {
         let camera = Camera::new(CameraModel::Brown, 640, 480, &[510.0, 318.0, 241.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-4, 0.0]).expect("valid");
         assert!(written(camera).expect_err("affinity").to_string().contains("C1/1.jpg has affinity"));
+        let lens = Camera::from_focal(CameraModel::Pinhole, 640, 480, 400.0).expect("valid");
+        let port = crate::FlatPort {
+            normal: Vector3::z_axis(),
+            distance_m: 0.03,
+            thickness_m: 0.008,
+            index_air: 1.0,
+            index_port: 1.49,
+            index_water: 1.34,
+            object_distance_m: 3.0,
+        };
+        let refused = written(lens.behind(Some(port)).expect("possible")).expect_err("a port");
+        assert!(refused.to_string().contains("C1/1.jpg stands behind a port"), "{refused}");
     }
 }
