@@ -15,8 +15,13 @@ const GOOD_SHARE: f64 = 0.9;
 /// Fewer frames than this are oriented one after the other: that is quick, and as good.
 const GLOBAL_FROM_FRAMES: usize = 30;
 
-/// A model, the tries of its frames, and how it was made.
-pub(crate) type Attempt<'a> = (Model<'a>, Tries, Made);
+/// What [`model_of`] comes to.
+pub(crate) enum Attempt<'a> {
+    /// A model, the tries of its frames, and how it was made.
+    Model(Box<Model<'a>>, Tries, Made),
+    /// No start held.
+    NoModel(Starts),
+}
 
 /// How a model was made.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,7 +39,7 @@ pub(crate) fn model_of<'a>(
     allowed: &[bool],
     metric: bool,
     options: &OrientOptions,
-) -> Result<Result<Attempt<'a>, Starts>, MapError> {
+) -> Result<Attempt<'a>, MapError> {
     let frames = allowed.iter().filter(|a| **a).count();
     let unknown = empty.input.cameras.iter().find(|c| !c.alternatives.is_empty());
     let (global, reason) = match (options.mapper, unknown) {
@@ -50,7 +55,7 @@ pub(crate) fn model_of<'a>(
         let reachable = reachable(empty, allowed, options);
         match found {
             Some((model, tries)) if model.oriented_frames().len() as f64 >= GOOD_SHARE * reachable as f64 => {
-                return Ok(Ok((model, tries, Made { global, reason })));
+                return Ok(Attempt::Model(Box::new(model), tries, Made { global, reason }));
             }
             found => fallen = Some(found),
         }
@@ -60,15 +65,15 @@ pub(crate) fn model_of<'a>(
     let size = |m: &Model| (m.oriented_frames().len(), m.observation_count());
     Ok(match (fallen, grown) {
         (Some(Some((model, tries))), grown) if grown.as_ref().is_none_or(|(g, _)| size(g) <= size(&model)) => {
-            Ok((model, tries, Made { global, reason }))
+            Attempt::Model(Box::new(model), tries, Made { global, reason })
         }
         (Some(found), Some((model, tries))) => {
             let oriented = found.map_or(0, |(m, _)| m.oriented_frames().len());
             let reason = format!("all at once oriented only {oriented} of {frames} frames");
-            Ok((model, tries, Made { global: false, reason }))
+            Attempt::Model(Box::new(model), tries, Made { global: false, reason })
         }
-        (None, Some((model, tries))) => Ok((model, tries, Made { global: false, reason })),
-        (_, None) => Err(starts),
+        (None, Some((model, tries))) => Attempt::Model(Box::new(model), tries, Made { global: false, reason }),
+        (_, None) => Attempt::NoModel(starts),
     })
 }
 

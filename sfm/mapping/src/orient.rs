@@ -1,6 +1,6 @@
 //! The way from verified pairs to models.
 
-use crate::attempt::model_of;
+use crate::attempt::{Attempt, model_of};
 use crate::contradiction;
 use crate::error::MapError;
 use crate::finish::{Done, finish_grown, length_notes};
@@ -130,8 +130,8 @@ fn one_by_one<'a>(
         needed: options.initial_min_inliers,
     };
     let (mut model, tries, made) = match model_of(independent, || from_pairs(independent, &any, options), &any, false, options)? {
-        Ok(found) => found,
-        Err(starts) => return Err(none(&starts)),
+        Attempt::Model(model, tries, made) => (*model, tries, made),
+        Attempt::NoModel(starts) => return Err(none(&starts)),
     };
     let outcomes = by_image(&model, &tries);
     let mut scale = Scale::Arbitrary;
@@ -173,9 +173,9 @@ fn on_rig<'a>(
     let empty = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
     let allowed: Vec<bool> = empty.frame_images.iter().map(|images| images.iter().all(|i| !taken[i.index()])).collect();
     let starts = || from_exposures(&empty, &allowed, &options.growing());
-    let Ok((model, tries, made)) = model_of(&empty, starts, &allowed, true, options)? else { return Ok(None) };
+    let Attempt::Model(model, tries, made) = model_of(&empty, starts, &allowed, true, options)? else { return Ok(None) };
     let outcomes = by_image(&model, &tries);
-    let done = Done { made: Some(made), ..finish_grown(model, outcomes, scale, options)? };
+    let done = Done { made: Some(made), ..finish_grown(*model, outcomes, scale, options)? };
     Ok((!done.model.oriented_frames().is_empty()).then_some(done))
 }
 
@@ -215,9 +215,9 @@ fn further_model<'a>(
     let layout = Layout::independent(input);
     let empty = Model::new(input, graph, cameras, layout.rigs, layout.frames, layout.images);
     let starts = || from_pairs(&empty, &allowed, options);
-    let Ok((model, tries, _)) = model_of(&empty, starts, &allowed, false, options)? else { return Ok(None) };
+    let Attempt::Model(model, tries, _) = model_of(&empty, starts, &allowed, false, options)? else { return Ok(None) };
     let outcomes = by_image(&model, &tries);
-    Ok(Some(finish_grown(model, outcomes, Scale::Arbitrary, options)?).filter(enough))
+    Ok(Some(finish_grown(*model, outcomes, Scale::Arbitrary, options)?).filter(enough))
 }
 
 /// Why each image of the first model has no pose.
