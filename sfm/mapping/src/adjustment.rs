@@ -13,7 +13,7 @@ use solve::adjust::{
 };
 
 /// Loss of positions, directions and headings: acoustic positions jump by tens of metres, compasses near steel by tens of degrees.
-const SENSOR_LOSS: Loss = Loss::Cauchy { scale_px: 3.0 };
+pub(crate) const SENSOR_LOSS: Loss = Loss::Cauchy { scale_px: 3.0 };
 
 /// No parameter of a model moves by a larger share of it when it is adjusted again.
 const PARAMETER_TOLERANCE: f64 = 1e-9;

@@ -1,12 +1,12 @@
 //! How good an orientation is: standard deviations, and whether the given ones are plausible.
 
-use crate::adjustment::{ProblemMap, sensor_of, whole_problem};
+use crate::adjustment::{ProblemMap, SENSOR_LOSS, sensor_of, whole_problem};
 use crate::lengths::{Known, LengthId};
 use crate::model::Model;
 use crate::options::OrientOptions;
 use nalgebra::{Matrix3, Matrix3x6};
 use scene::{ImageId, Scale};
-use solve::adjust::{AdjustSummary, Baseline, Covariance, CovarianceError, ImageObservation, Loss, Problem, covariance};
+use solve::adjust::{AdjustSummary, Baseline, Covariance, CovarianceError, CovarianceOptions, ImageObservation, Problem, covariance};
 use solve::lie::skew;
 
 /// A length whose normalised residual is larger contradicts the others: one right length in a thousand does by chance (Baarda, *A testing
@@ -66,7 +66,7 @@ const EXACTLY: f64 = 1e-6;
 /// Standard deviations of a model after its last adjustment.
 ///
 /// The image observations are weighed by what their residuals say (variance component estimation, one step), lengths as given. Outliers
-/// are gone by now, so that no loss is applied.
+/// are gone by now, so that no loss is applied to them; readings of instruments count with the weights that they had in the adjustment.
 pub(crate) fn quality(
     model: &Model,
     known: &Known,
@@ -81,12 +81,13 @@ pub(crate) fn quality(
     }
     let sigma0_image = image_sigma(&problem, adjustment.free.total);
     problem.observations.iter_mut().for_each(|o| o.sigma_px *= sigma0_image);
-    let found = covariance(&problem, &Loss::Trivial)?;
+    let weights = CovarianceOptions { sensor_loss: SENSOR_LOSS, ..CovarianceOptions::default() };
+    let found = covariance(&problem, &weights)?;
     let datum = model.frame_images.iter().enumerate().find(|(f, _)| places.frame(*f) == Some(held));
     let datum = datum.and_then(|(_, images)| images.first().copied()).unwrap_or(ImageId(0));
     let datum_in_world = if known.ties.fix_world {
         problem.frames[held as usize].free = true;
-        let found = covariance(&problem, &Loss::Trivial)?;
+        let found = covariance(&problem, &weights)?;
         pose_sigma(model, datum, &problem, &places, &found)
     } else {
         None

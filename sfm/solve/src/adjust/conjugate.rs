@@ -5,10 +5,11 @@
 //! consecutive frames: their factors precondition (Kushal & Agarwal, *Visibility based preconditioning for bundle adjustment*, CVPR 2012).
 //! The blocks on the diagonal of a positive definite matrix are positive definite, so the factors exist.
 
+use super::clusters::Clusters;
 use super::layout::Layout;
 use super::lengths::KeptNormal;
 use super::linearise::Linearised;
-use super::pattern::{Clusters, Pattern};
+use super::pattern::Pattern;
 use super::pieces::{Sliced, for_each_piece};
 use super::schur::Reduced;
 use faer::dyn_stack::{MemBuffer, MemStack};

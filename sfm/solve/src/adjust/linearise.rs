@@ -67,6 +67,11 @@ impl Linearised {
         }
     }
 
+    /// Gives back the memory of the sums by piece: there will be no other update.
+    pub fn forget_pieces(&mut self) {
+        (self.piece_views, self.piece_views_start) = (Vec::new(), Vec::new());
+    }
+
     /// Computes the normal equations at `state`; returns the cost.
     pub fn update(&mut self, layout: &Layout, state: &State, loss: &Loss, parallel: bool) -> f64 {
         let pieces = &layout.pieces;

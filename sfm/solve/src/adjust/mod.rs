@@ -5,14 +5,18 @@
 //! the points into a system whose `pattern` is dense or sparse; `solve_reduced` factorises it; `step` goes back to the
 //! points and evaluates; `lm` decides. `kernels` has the inner loops, `pieces` the parallel ones.
 
+mod clusters;
 mod conjugate;
+mod consistency;
 mod covariance;
 mod error;
+mod inverse;
 mod kernels;
 mod layout;
 mod lengths;
 mod linearise;
 mod lm;
+mod meetings;
 mod options;
 mod pattern;
 mod pieces;
@@ -26,7 +30,8 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
-pub use covariance::{Covariance, CovarianceError, covariance};
+pub use consistency::{Consistency, NormalisedError, consistency};
+pub use covariance::{Covariance, CovarianceError, CovarianceOptions, covariance};
 pub use error::AdjustError;
 pub use lm::adjust;
 pub use options::{AdjustOptions, Loss};

@@ -1,9 +1,10 @@
 //! Which blocks of the reduced system are stored, and where.
 
-use super::layout::{Incidence, Layout, NONE, Owner, Slot};
+use super::clusters::Clusters;
+use super::layout::{Layout, Owner};
 use super::lengths::KeptNormal;
-use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::amd;
+use super::meetings::{Fill, Meetings, products};
+use crate::numeric::packed_inverse;
 
 /// Reduced systems up to this size are dense whatever their pattern.
 const DENSE_UNKNOWNS: usize = 300;
@@ -19,6 +20,11 @@ const ITERATIVE_OPERATIONS: f64 = 600.0;
 const MAX_SHARED_UNKNOWNS: usize = 1000;
 /// Unknowns of a cluster of frames, of which the preconditioner keeps all blocks.
 const CLUSTER_UNKNOWNS: usize = 600;
+/// Unknowns of a group of columns of a packed matrix: products of blocks of this size run at full speed, and there are enough of them for
+/// all threads.
+pub(super) const PACKED_UNKNOWNS: usize = 384;
+/// A sparse factorisation and its solutions take so many times longer an operation than products of large blocks: they wait for memory.
+const SPARSE_SLOWNESS: f64 = 3.0;
 
 /// Layout of the panels of [`super::schur`].
 #[derive(Debug)]
@@ -34,51 +40,21 @@ pub(super) struct Pattern {
 /// How much of the matrix is stored.
 #[derive(Debug)]
 pub(super) enum Kind {
-    /// Each panel has all rows of the matrix.
-    Dense,
+    /// Each panel has all rows of the matrix from the first unknown of its group on. One group holds the whole matrix.
+    Dense(Groups),
     /// The blocks that meet.
     Sparse(SparsePattern),
     /// What conjugate gradients keep.
     Clusters(Clusters),
 }
 
-/// Blocks of frames in clusters of consecutive ones, and of what frames share with each other: sensors, cameras, kept points. Stored are
-/// the blocks inside a cluster and all blocks with something shared.
+/// Groups of consecutive blocks.
 #[derive(Debug)]
-pub(super) struct Clusters {
-    /// First block of each cluster, and the end of the last, which is where the shared blocks begin.
-    pub start: Vec<usize>,
-    /// The end of the cluster of each block of a frame.
-    end_of: Vec<u32>,
-}
-
-impl Clusters {
-    fn new(layout: &Layout, cluster_unknowns: usize) -> Self {
-        let frames = layout.owners.iter().take_while(|o| matches!(o, Owner::Frame(_))).count();
-        let count = layout.offsets[frames].div_ceil(cluster_unknowns).max(1);
-        let start: Vec<usize> = (0..=count).map(|i| i * frames / count).collect();
-        let end_of = start.windows(2).flat_map(|w| std::iter::repeat_n(w[1] as u32, w[1] - w[0])).collect();
-        Self { start, end_of }
-    }
-
-    /// The first shared block.
-    pub fn shared(&self) -> usize {
-        self.start[self.start.len() - 1]
-    }
-
-    /// Rows of the panel of block `a` before the shared ones.
-    pub fn own_rows(&self, a: usize, offsets: &[usize]) -> usize {
-        self.end_of.get(a).map_or(0, |&end| offsets[end as usize] - offsets[a])
-    }
-
-    fn row(&self, a: usize, b: u32, offsets: &[usize]) -> Option<usize> {
-        let b = b as usize;
-        let shared = self.shared();
-        if a >= shared || self.end_of[a] as usize > b {
-            return Some(offsets[b] - offsets[a]);
-        }
-        (b >= shared).then(|| self.own_rows(a, offsets) + offsets[b] - offsets[shared])
-    }
+pub(super) struct Groups {
+    /// First unknown of each group, and the end.
+    pub starts: Vec<usize>,
+    /// First unknown of the group of each block.
+    first: Vec<usize>,
 }
 
 /// Rows of the panels of a sparse system.
@@ -109,7 +85,7 @@ impl Pattern {
         let met = Meetings::new(layout, kept);
         let is_sparse = (met.values(layout) as f64) < DENSE_SHARE * (n * n) as f64 / 2.0;
         let order = if is_sparse { met.order() } else { Vec::new() };
-        let operations = if is_sparse { met.operations(layout, &order) } else { (n as f64).powi(3) / 3.0 };
+        let operations = if is_sparse { met.fill(layout, &order).operations } else { (n as f64).powi(3) / 3.0 };
         let frames = layout.owners.iter().take_while(|o| matches!(o, Owner::Frame(_))).count();
         let shared = n - layout.offsets[frames];
         let is_hard = operations > DIRECT_OPERATIONS.max(ITERATIVE_OPERATIONS * layout.w_len() as f64);
@@ -125,25 +101,64 @@ impl Pattern {
     pub fn clustered(layout: &Layout, cluster_unknowns: usize) -> Self {
         let clusters = Clusters::new(layout, cluster_unknowns);
         let offsets = &layout.offsets;
-        let mut pattern = Self { panel_start: vec![0], stride: Vec::new(), kind: Kind::Dense, offsets: offsets.clone() };
+        let (mut panel_start, mut strides) = (vec![0], Vec::new());
         for a in 0..layout.block_count() {
             let shared = offsets[layout.block_count()] - offsets[a.max(clusters.shared())];
             let rows = clusters.own_rows(a, offsets) + shared;
-            pattern.stride.push(rows);
-            pattern.panel_start.push(pattern.panel_start[a] + rows * layout.dim(a));
+            strides.push(rows);
+            panel_start.push(panel_start[a] + rows * layout.dim(a));
         }
-        pattern.kind = Kind::Clusters(clusters);
-        pattern
+        Self { panel_start, stride: strides, kind: Kind::Clusters(clusters), offsets: offsets.clone() }
     }
 
-    pub fn dense(layout: &Layout) -> Self {
+    /// A pattern whose inverse can be had: never that of conjugate gradients. `Err` with the number of values where that takes more than
+    /// `most_values`.
+    pub fn invertible(layout: &Layout, kept: &KeptNormal, most_values: f64) -> Result<Self, f64> {
         let n = layout.unknowns();
-        Self {
-            panel_start: layout.offsets.iter().map(|o| o * n).collect(),
-            stride: vec![n; layout.block_count()],
-            kind: Kind::Dense,
-            offsets: layout.offsets.clone(),
+        let packed = Self::packed(layout, PACKED_UNKNOWNS);
+        let mut least = packed.len() as f64;
+        if n > DENSE_UNKNOWNS {
+            let met = Meetings::new(layout, kept);
+            let order = met.order();
+            let Fill { operations, values } = met.fill(layout, &order);
+            // The system, its factor, and the inverse where the system is.
+            let total = values + 2.0 * met.values(layout) as f64;
+            // All columns are solved for, against n^3 operations of a packed inverse.
+            let is_quick = SPARSE_SLOWNESS * (operations + 4.0 * n as f64 * values) < (n as f64).powi(3);
+            if total <= most_values && (is_quick || least > most_values) {
+                return Ok(Self::from_meetings(layout, &met, order));
+            }
+            least = least.min(total);
         }
+        if packed.len() as f64 <= most_values { Ok(packed) } else { Err(least) }
+    }
+
+    /// The whole matrix.
+    pub fn dense(layout: &Layout) -> Self {
+        Self::packed(layout, usize::MAX)
+    }
+
+    /// The lower half of the matrix, in groups of at most that many unknowns, or of one block: see [`packed_inverse`].
+    pub fn packed(layout: &Layout, group_unknowns: usize) -> Self {
+        let offsets = &layout.offsets;
+        let mut groups = Groups { starts: vec![0], first: Vec::with_capacity(layout.block_count()) };
+        let mut first = 0;
+        for a in 0..layout.block_count() {
+            if offsets[a] > first && offsets[a + 1] - first > group_unknowns {
+                first = offsets[a];
+                groups.starts.push(first);
+            }
+            groups.first.push(first);
+        }
+        let n = layout.unknowns();
+        groups.starts.push(n);
+        let stride: Vec<usize> = groups.first.iter().map(|first| n - first).collect();
+        let mut panel_start = vec![0];
+        for (a, stride) in stride.iter().enumerate() {
+            panel_start.push(panel_start[a] + stride * layout.dim(a));
+        }
+        debug_assert_eq!(panel_start.last().copied(), Some(packed_inverse::stored(&groups.starts)));
+        Self { panel_start, stride, kind: Kind::Dense(groups), offsets: offsets.clone() }
     }
 
     #[cfg(test)]
@@ -154,7 +169,7 @@ impl Pattern {
     }
 
     fn from_meetings(layout: &Layout, met: &Meetings, order: Vec<usize>) -> Self {
-        let mut pattern = Self { panel_start: vec![0], stride: Vec::new(), kind: Kind::Dense, offsets: layout.offsets.clone() };
+        let (mut panel_start, mut stride) = (vec![0], Vec::new());
         let mut sparse = SparsePattern { rows: Vec::new(), rows_start: vec![0], product_rows: Vec::new(), order };
         for a in 0..layout.block_count() {
             let mut row = 0;
@@ -163,8 +178,8 @@ impl Pattern {
                 row += layout.dim(b) as u32;
             }
             sparse.rows_start.push(sparse.rows.len());
-            pattern.stride.push(row as usize);
-            pattern.panel_start.push(pattern.panel_start[a] + row as usize * layout.dim(a));
+            stride.push(row as usize);
+            panel_start.push(panel_start[a] + row as usize * layout.dim(a));
         }
         sparse.product_rows.reserve(layout.block_products.iter().sum());
         for (a, others) in products(layout) {
@@ -175,8 +190,7 @@ impl Pattern {
                 sparse.product_rows.push(rows[from].1);
             }
         }
-        pattern.kind = Kind::Sparse(sparse);
-        pattern
+        Self { panel_start, stride, kind: Kind::Sparse(sparse), offsets: layout.offsets.clone() }
     }
 
     /// The clusters, where only they are stored.
@@ -192,10 +206,10 @@ impl Pattern {
         self.panel_start[self.panel_start.len() - 1]
     }
 
-    /// First row of block `b` in the panel of block `a`, which meets it; `None` where it is not stored.
+    /// First row of block `b`, which is not before `a`, in the panel of block `a`, which meets it; `None` where it is not stored.
     pub fn row(&self, a: usize, b: u32) -> Option<usize> {
         match &self.kind {
-            Kind::Dense => Some(self.offsets[b as usize]),
+            Kind::Dense(groups) => Some(self.offsets[b as usize] - groups.first[a]),
             Kind::Sparse(sparse) => {
                 let rows = &sparse.rows[sparse.rows_start[a]..sparse.rows_start[a + 1]];
                 Some(rows[rows.partition_point(|r| r.0 < b)].1 as usize)
@@ -204,132 +218,18 @@ impl Pattern {
         }
     }
 
-    /// Calls `row` with each block of which the panel of block `a` has rows, in order.
-    pub fn for_rows(&self, a: usize, mut row: impl FnMut(usize)) {
-        let blocks = self.offsets.len() - 1;
-        match &self.kind {
-            Kind::Dense => (0..blocks).for_each(row),
-            Kind::Sparse(sparse) => {
-                sparse.rows[sparse.rows_start[a]..sparse.rows_start[a + 1]].iter().for_each(|&(b, _)| row(b as usize));
-            }
-            Kind::Clusters(clusters) => (a..blocks).filter(|&b| clusters.row(a, b as u32, &self.offsets).is_some()).for_each(row),
-        }
-    }
-
     /// First row of the diagonal block in the panel of block `a`.
     pub fn diagonal_row(&self, a: usize) -> usize {
-        if matches!(self.kind, Kind::Dense) { self.offsets[a] } else { 0 }
+        if let Kind::Dense(groups) = &self.kind { self.offsets[a] - groups.first[a] } else { 0 }
     }
 
     /// First row of a product of the elimination, which is of blocks `a` and `b`.
     #[inline(always)]
     pub fn product_row(&self, product: usize, a: usize, b: u32) -> Option<usize> {
         match &self.kind {
-            Kind::Dense => Some(self.offsets[b as usize]),
+            Kind::Dense(groups) => Some(self.offsets[b as usize] - groups.first[a]),
             Kind::Sparse(sparse) => Some(sparse.product_rows[product] as usize),
             Kind::Clusters(clusters) => clusters.row(a, b, &self.offsets),
         }
     }
-}
-
-/// For each block, the blocks from it on that some residual or point couples with it: a bit for each.
-struct Meetings {
-    words: usize,
-    bits: Vec<u64>,
-}
-
-impl Meetings {
-    fn new(layout: &Layout, kept: &KeptNormal) -> Self {
-        let blocks = layout.block_count();
-        let words = blocks.div_ceil(64).max(1);
-        let mut bits = vec![0u64; blocks * words];
-        let mut meet = |a: u32, b: u32| bits[a as usize * words + b as usize / 64] |= 1 << (b % 64);
-        (0..blocks as u32).for_each(|a| meet(a, a));
-        kept.pairs.iter().for_each(|&(a, b, _)| meet(a, b));
-        for view in &layout.views {
-            for (i, &a) in view.block.iter().enumerate().filter(|(_, a)| **a != NONE) {
-                view.block[i..].iter().filter(|&&b| b != NONE).for_each(|&b| meet(a, b));
-            }
-        }
-        for (a, others) in products(layout) {
-            others.iter().for_each(|b| meet(a, b.block));
-        }
-        Self { words, bits }
-    }
-
-    /// The blocks that `a` meets, ascending.
-    fn of(&self, a: usize) -> impl Iterator<Item = usize> + '_ {
-        self.bits[a * self.words..(a + 1) * self.words].iter().enumerate().flat_map(|(word, &bits)| {
-            let next = |bits: &u64| Some(bits & (bits - 1)).filter(|&rest| rest != 0);
-            let sets = std::iter::successors(Some(bits).filter(|&b| b != 0), next);
-            sets.map(move |bits| 64 * word + bits.trailing_zeros() as usize)
-        })
-    }
-
-    /// An order of elimination with little fill: approximate minimum degree (Amestoy, Davis & Duff, 1996) of the blocks, which takes a
-    /// small part of the time that it takes of the unknowns.
-    fn order(&self) -> Vec<usize> {
-        let blocks = self.bits.len() / self.words;
-        // Both triangles, by columns.
-        let mut columns = vec![Vec::new(); blocks];
-        for a in 0..blocks {
-            for b in self.of(a).filter(|&b| b != a) {
-                columns[a].push(b);
-                columns[b].push(a);
-            }
-        }
-        let mut start = vec![0];
-        let mut rows = Vec::new();
-        for column in &mut columns {
-            column.sort_unstable();
-            rows.extend_from_slice(column);
-            start.push(rows.len());
-        }
-        let structure = SymbolicSparseColMatRef::new_checked(blocks, blocks, &start, None, &rows);
-        let (mut order, mut inverse) = (vec![0; blocks], vec![0; blocks]);
-        let mut memory = faer::dyn_stack::MemBuffer::new(amd::order_scratch::<usize>(blocks, rows.len()));
-        let stack = faer::dyn_stack::MemStack::new(&mut memory);
-        match amd::order(&mut order, &mut inverse, structure, amd::Control::default(), stack) {
-            Ok(_) => order,
-            Err(_) => (0..blocks).collect(),
-        }
-    }
-
-    /// Operations of a Cholesky factorisation in the given order, about.
-    fn operations(&self, layout: &Layout, order: &[usize]) -> f64 {
-        let blocks = order.len();
-        let mut place = vec![0; blocks];
-        order.iter().enumerate().for_each(|(i, &b)| place[b] = i);
-        let mut below = vec![Vec::new(); blocks];
-        for a in 0..blocks {
-            for b in self.of(a).filter(|&b| b != a) {
-                below[place[a].min(place[b])].push(place[a].max(place[b]));
-            }
-        }
-        // The rows of a column join those of its parent, the first of them (Liu 1990).
-        let mut operations = 0.0;
-        for k in 0..blocks {
-            let mut rows = std::mem::take(&mut below[k]);
-            rows.sort_unstable();
-            rows.dedup();
-            let dim = layout.dim(order[k]) as f64;
-            let length: usize = rows.iter().map(|&r| layout.dim(order[r])).sum();
-            operations += dim * (length as f64 + dim).powi(2);
-            if let Some((&parent, rest)) = rows.split_first() {
-                below[parent].extend_from_slice(rest);
-            }
-        }
-        operations
-    }
-
-    /// Number of values of all panels.
-    fn values(&self, layout: &Layout) -> usize {
-        (0..layout.block_count()).map(|a| layout.dim(a) * self.of(a).map(|b| layout.dim(b)).sum::<usize>()).sum()
-    }
-}
-
-/// Each block that a point meets, with it and those after it, point by point: the products of the elimination.
-fn products(layout: &Layout) -> impl Iterator<Item = (u32, &[Incidence])> {
-    let of_point = |s: &[Slot]| &layout.incidences[s[0].first_incidence as usize..s[1].first_incidence as usize];
-    layout.slots.windows(2).map(of_point).flat_map(|met| met.iter().enumerate().map(move |(i, a)| (a.block, &met[i..])))
 }

@@ -21,11 +21,12 @@
 //!
 //! Damping as in Ceres: D = diag(F^T F) / radius, after the scaled diagonal was clamped; see [`damping`].
 
+use super::clusters::Clusters;
 use super::kernels::subtract_product;
 use super::layout::{Layout, NONE};
 use super::lengths::KeptNormal;
 use super::linearise::{Linearised, PointNormal};
-use super::pattern::{Clusters, Pattern};
+use super::pattern::Pattern;
 use super::pieces::{Sliced, for_each_piece};
 use scene::camera::MAX_CAMERA_PARAMS;
 
@@ -33,6 +34,8 @@ use scene::camera::MAX_CAMERA_PARAMS;
 const MIN_PIVOT: f64 = 1e-14;
 /// A group of panels is not made much larger than this, 2 MiB: the points scatter into it.
 const GROUP_VALUES: usize = 256 * 1024;
+/// Nor are there many more groups than this for their size: each walks all points.
+const SIZE_GROUPS: usize = 64;
 
 /// What is added to the diagonal element h = |column|^2 of the normal matrix.
 ///
@@ -150,11 +153,12 @@ impl Groups {
         let frames = pattern.clusters().map_or(0, Clusters::shared);
         let mut groups = Self { blocks: vec![0], values: vec![0], unknowns: vec![0], normals: vec![0] };
         let most_work = layout.block_products.iter().sum::<usize>() / count.max(1);
+        let most_values = GROUP_VALUES.max(pattern.len() / SIZE_GROUPS);
         let mut work = 0;
         for a in 0..layout.block_count() {
             work += layout.block_products[a];
             let values = pattern.panel_start[a + 1] - groups.values[groups.values.len() - 1];
-            if (count > 1 && work >= most_work) || values >= GROUP_VALUES || a + 1 == layout.block_count() {
+            if (count > 1 && work >= most_work) || values >= most_values || a + 1 == layout.block_count() {
                 groups.blocks.push(a + 1);
                 groups.values.push(pattern.panel_start[a + 1]);
                 groups.unknowns.push(layout.offsets[a + 1]);

@@ -14,7 +14,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::{factor, solve};
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::SymmetricOrdering;
-use faer::{MatMut, MatRef, Par};
+use faer::{MatMut, Par};
 
 /// Symbolic analysis and workspace.
 pub(super) enum Solver {
@@ -28,7 +28,7 @@ impl Solver {
         let unknowns = layout.unknowns();
         let out_of_memory = AdjustError::OutOfMemory { unknowns };
         match &pattern.kind {
-            Kind::Dense => {
+            Kind::Dense(_) => {
                 let request = factor::cholesky_in_place_scratch::<f64>(unknowns, Par::Seq, Default::default());
                 MemBuffer::try_new(request).map(Self::Dense).map_err(|_| out_of_memory)
             }
@@ -66,27 +66,11 @@ impl Solver {
         }
         reduced.rhs.iter().all(|d| d.is_finite())
     }
-
-    /// Solves for more right-hand sides, by columns, with the factor of the last [`Solver::solve`]; `None` where there is none to solve
-    /// with again.
-    pub fn solve_again(&self, reduced: &Reduced, columns: &mut [f64], count: usize) -> Option<()> {
-        let n = reduced.rhs.len();
-        match self {
-            Self::Dense(_) => {
-                let factor = MatRef::from_column_major_slice(&reduced.values, n, n);
-                let rhs = MatMut::from_column_major_slice_mut(columns, n, count);
-                solve::solve_in_place(factor, rhs, Par::Seq, MemStack::new(&mut []));
-                Some(())
-            }
-            Self::Sparse(sparse) => sparse.solve_again(columns, count),
-            Self::Conjugate(_) => None,
-        }
-    }
 }
 
 /// The panels as compressed columns: the values of a column of a panel stand one after the other. Those above the
 /// diagonal inside a diagonal block are stored and ignored.
-fn analyse(layout: &Layout, pattern: &Pattern, rows: &SparsePattern) -> Option<SparseCholesky> {
+pub(super) fn analyse(layout: &Layout, pattern: &Pattern, rows: &SparsePattern) -> Option<SparseCholesky> {
     let n = layout.unknowns();
     let mut column_start = vec![0];
     let mut row_index = Vec::with_capacity(pattern.len());

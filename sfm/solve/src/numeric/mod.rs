@@ -2,5 +2,6 @@
 
 pub(crate) mod minimise;
 pub(crate) mod null_space;
+pub(crate) mod packed_inverse;
 pub(crate) mod polynomial;
 pub(crate) mod sparse_cholesky;

@@ -3,7 +3,10 @@
 use super::normal_equations::{everything, layout_order};
 use super::oracle::{Unknown, jacobian};
 use super::scene::{Options, free_camera, truth};
+use crate::adjust::covariance::Normal;
 use crate::adjust::layout::Layout;
+use crate::adjust::lengths::KeptNormal;
+use crate::adjust::pattern::Pattern;
 use crate::adjust::state::State;
 use crate::adjust::*;
 use crate::lie::so3_log;
@@ -26,12 +29,52 @@ fn block<const N: usize>(order: &[Unknown], inverse: &DMatrix<f64>, first: Unkno
     inverse.fixed_view::<N, N>(at, at).into_owned()
 }
 
+/// By the inverse of a system with the given pattern.
+fn by(problem: &Problem, options: &CovarianceOptions, pattern: impl Fn(&Layout, &KeptNormal) -> Pattern) -> Covariance {
+    let mut system = Normal::new(problem, options).expect("valid");
+    let pattern = pattern(&system.layout, &system.kept);
+    let inverse = system.invert(pattern).expect("determined");
+    system.collect(problem, &inverse, options)
+}
+
+/// All numbers of a covariance.
+fn values(c: &Covariance) -> Vec<f64> {
+    let poses = c.frames.iter().chain(&c.sensors).flatten().flat_map(|m| m.iter().copied());
+    let cameras = c.cameras.iter().flatten().flat_map(|m| m.iter().copied());
+    let points = c.points.iter().flatten().flat_map(|m| m.iter().copied());
+    poses.chain(cameras).chain(points).chain(c.redundancy.iter().copied()).chain([c.total_redundancy]).collect()
+}
+
+#[test]
+fn all_routes_agree() {
+    let mut problem = everything(CameraModel::OpenCv, 3);
+    // An outlying reading, and one wrong observation.
+    problem.positions[0].xyz.x += 3.0;
+    problem.observations[10].pixel.x += 30.0;
+    let robust = Loss::Cauchy { scale_px: 2.0 };
+    let options = CovarianceOptions { loss: robust, sensor_loss: robust, ..CovarianceOptions::default() };
+    let whole = values(&by(&problem, &options, |layout, _| Pattern::dense(layout)));
+    // Groups of a block, of some, and the sparse system.
+    let others = [
+        values(&by(&problem, &options, |layout, _| Pattern::packed(layout, 1))),
+        values(&by(&problem, &options, |layout, _| Pattern::packed(layout, 20))),
+        values(&by(&problem, &options, Pattern::sparse)),
+        values(&covariance(&problem, &options).expect("determined")),
+    ];
+    for other in others {
+        assert_eq!(whole.len(), other.len());
+        // Each block is as exact as its largest element; the smallest variances are 1e-6 of that of a focal length.
+        let far = whole.iter().zip(&other).filter(|(a, b)| (*a - *b).abs() > 1e-9 * (a.abs() + 1e-4)).count();
+        assert_eq!(far, 0);
+    }
+}
+
 #[test]
 fn covariances_are_blocks_of_the_inverse() {
     for sensors in [1, 3] {
         let problem = everything(CameraModel::Radial, sensors);
         let (order, j, inverse) = dense(&problem);
-        let found = covariance(&problem, &Loss::Trivial).expect("determined");
+        let found = covariance(&problem, &CovarianceOptions::default()).expect("determined");
         // The Jacobian by differences errs by 1e-9; the inverse magnifies it.
         let near = |a: &[f64], b: &[f64]| {
             let size = b.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -68,12 +111,12 @@ fn covariances_are_blocks_of_the_inverse() {
 #[test]
 fn a_world_that_floats_has_none() {
     let floating = truth(&Options::default());
-    assert_eq!(covariance(&floating, &Loss::Trivial), Err(CovarianceError::Singular));
+    assert_eq!(covariance(&floating, &CovarianceOptions::default()), Err(CovarianceError::Singular));
     let mut no_scale = floating;
     no_scale.frames[0].free = false;
-    assert_eq!(covariance(&no_scale, &Loss::Trivial), Err(CovarianceError::Singular));
+    assert_eq!(covariance(&no_scale, &CovarianceOptions::default()), Err(CovarianceError::Singular));
     no_scale.baselines = vec![Baseline { a: (0, 0), b: (5, 0), length: 1.0, sigma: 0.01 }];
-    assert!(covariance(&no_scale, &Loss::Trivial).is_ok());
+    assert!(covariance(&no_scale, &CovarianceOptions::default()).is_ok());
 }
 
 /// The step (w, d) from one pose to another.
@@ -105,7 +148,7 @@ fn consistency(sensors: usize, rigid: bool, seeds: u64) -> (f64, f64) {
         }
         let mut problem = truth.clone();
         adjust(&mut problem, &AdjustOptions { function_tolerance: 1e-12, ..AdjustOptions::default() }).expect("valid");
-        let found = covariance(&problem, &Loss::Trivial).expect("determined");
+        let found = covariance(&problem, &CovarianceOptions::default()).expect("determined");
         let e = error(&problem.frames[5].pose, &truth.frames[5].pose);
         of_frame += e.dot(&(found.frames[5].expect("free").try_inverse().expect("positive") * e));
         let e = problem.points[30].xyz - truth.points[30].xyz;
@@ -133,7 +176,7 @@ fn threads_change_no_bit() {
     problem.baselines = vec![Baseline { a: (0, 0), b: (59, 0), length: 1.0, sigma: 0.01 }];
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| covariance(&problem, &Loss::Trivial).expect("determined"))
+        pool.install(|| covariance(&problem, &CovarianceOptions::default()).expect("determined"))
     };
     assert!(on(1) == on(2));
 }
