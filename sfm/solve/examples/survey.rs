@@ -50,7 +50,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         problem.observations.len(),
         problem.baselines.len()
     );
-    timed("robust", &mut problem, &AdjustOptions { loss: Loss::Cauchy { scale_px: 2.0 }, ..AdjustOptions::default() })?;
+    timed(
+        "robust",
+        &mut problem,
+        &AdjustOptions { loss: Loss::Cauchy { scale_px: 2.0 }, function_tolerance: 1e-5, ..AdjustOptions::default() },
+    )?;
     loop {
         let (wrong, weak) = filter(&mut problem);
         leave_out_blind(&mut problem);

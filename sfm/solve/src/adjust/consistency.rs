@@ -21,6 +21,8 @@ pub struct NormalisedError {
     pub value: f64,
     /// What is expected: the number of scalar errors.
     pub expected: f64,
+    /// Its variance.
+    pub variance: f64,
     /// Where it lies in 95 of 100 cases.
     pub band: [f64; 2],
 }
@@ -29,11 +31,18 @@ impl NormalisedError {
     /// Of a weighted sum of squares of independent standard normal variables with this mean and this variance, which is taken for a
     /// multiple of a chi-square variable (Satterthwaite, *Biometrics Bulletin* 2, 1946) with the quantiles of Wilson & Hilferty (*PNAS* 17,
     /// 1931), which err by less than a hundredth of the width of the band from 10 degrees of freedom on.
-    fn new(value: f64, expected: f64, variance: f64) -> Self {
+    pub(super) fn new(value: f64, expected: f64, variance: f64) -> Self {
         let degrees = 2.0 * expected * expected / variance;
         let spread = 2.0 / (9.0 * degrees);
         let quantile = |z: f64| expected * (1.0 - spread + z * spread.sqrt()).powi(3);
-        Self { value, expected, band: [quantile(-NORMAL_95), quantile(NORMAL_95)] }
+        Self { value, expected, variance, band: [quantile(-NORMAL_95), quantile(NORMAL_95)] }
+    }
+
+    /// Of independent surveys together.
+    #[must_use]
+    pub fn sum(of: &[Self]) -> Self {
+        let sum = |part: fn(&Self) -> f64| of.iter().map(part).sum();
+        Self::new(sum(|e| e.value), sum(|e| e.expected), sum(|e| e.variance))
     }
 
     /// Whether it lies in the band.
