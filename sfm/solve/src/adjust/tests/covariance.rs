@@ -127,7 +127,7 @@ fn error(found: &Rigid3, truth: &Rigid3) -> Vector6<f64> {
 }
 
 /// Normalised squared errors of the pose of one frame and of the position of one point, summed over many seeds.
-fn consistency(sensors: usize, rigid: bool, seeds: u64) -> (f64, f64) {
+fn small_surveys(sensors: usize, rigid: bool, seeds: u64) -> (f64, f64) {
     let (mut of_frame, mut of_point) = (0.0, 0.0);
     for seed in 0..seeds {
         let options = Options { frames: 8, sensors, points: 60, track: 5, noise_px: 0.7, seed: 100 + seed, ..Options::default() };
@@ -163,10 +163,71 @@ fn errors_are_as_large_as_the_covariance_says() {
     let band = |degrees: f64| (degrees - 1.96 * (2.0 * degrees).sqrt())..(degrees + 1.96 * (2.0 * degrees).sqrt());
     for (sensors, rigid) in [(1, false), (2, true)] {
         let seeds = 100;
-        let (of_frame, of_point) = consistency(sensors, rigid, seeds);
+        let (of_frame, of_point) = small_surveys(sensors, rigid, seeds);
         assert!(band(6.0 * seeds as f64).contains(&of_frame), "rigid {rigid}: {}", of_frame / seeds as f64);
         assert!(band(3.0 * seeds as f64).contains(&of_point), "rigid {rigid}: {}", of_point / seeds as f64);
     }
+}
+
+/// A survey of 90 frames with 2 % of wrong observations: adjusted robustly, and by least squares without what that shows to be wrong.
+fn adjusted_survey(sensors: usize, seed: u64) -> (Problem, Vec<Rigid3>) {
+    let noise_px = 0.7;
+    let options = Options { frames: 90, sensors, points: 900, track: 5, arc: 0.03, noise_px, seed, ..Options::default() };
+    let mut problem = truth(&options);
+    let true_poses: Vec<Rigid3> = problem.frames.iter().map(|f| f.pose).collect();
+    let mut random = Random::new(seed);
+    for (i, o) in problem.observations.iter_mut().enumerate() {
+        o.sigma_px = noise_px;
+        if i % 50 == 7 {
+            o.pixel.x += random.uniform(15.0, 60.0);
+            o.pixel.y -= random.uniform(15.0, 60.0);
+        }
+    }
+    let centre = |f: u32, s: u32| (problem.sensors[s as usize].pose * problem.frames[f as usize].pose).centre();
+    let ends = (1..90).map(|f| if sensors == 1 { ((f - 1, 0), (f, 0)) } else { ((f, 0), (f, 1)) });
+    let length = |(a, b): ((u32, u32), (u32, u32))| (centre(a.0, a.1) - centre(b.0, b.1)).norm();
+    problem.baselines = ends.map(|(a, b)| Baseline { a, b, length: length((a, b)) + 0.002 * random.normal(), sigma: 0.002 }).collect();
+    problem.cameras.iter_mut().for_each(free_camera);
+    let run = |problem: &mut Problem, loss| {
+        let summary = adjust(problem, &AdjustOptions { loss, function_tolerance: 1e-10, ..AdjustOptions::default() }).expect("valid");
+        assert!(summary.termination.is_converged(), "{summary:?}");
+    };
+    run(&mut problem, Loss::Cauchy { scale_px: 2.0 });
+    let Problem { cameras, sensors, frames, points, observations, .. } = &mut problem;
+    observations.retain(|o| {
+        let pose = sensors[o.sensor as usize].pose * frames[o.frame as usize].pose;
+        let pixel = cameras[o.camera as usize].camera.project(&pose.apply(&points[o.point as usize].xyz)).expect("in front");
+        (pixel - o.pixel).norm() < 5.0 * o.sigma_px
+    });
+    run(&mut problem, Loss::Trivial);
+    problem.frames[45].free = false;
+    (problem, true_poses)
+}
+
+#[test]
+fn what_consistency_and_covariance_say_is_the_same() {
+    let (problem, truth) = adjusted_survey(1, 5);
+    let options = CovarianceOptions::default();
+    let found = consistency(&problem, &truth, &options).expect("determined");
+    // That of the sequence is sparse.
+    let (a, b) = (values(&found.covariance), values(&covariance(&problem, &options).expect("determined")));
+    let far = a.iter().zip(&b).filter(|(a, b)| (*a - *b).abs() > 1e-7 * a.abs() + 1e-12).count();
+    assert_eq!((a.len(), far), (b.len(), 0));
+    // e^T Cov^-1 e of the frames alone, from the definitions.
+    let (order, _, inverse) = dense(&problem);
+    let frames: Vec<usize> = (0..90).filter(|f| *f != 45).collect();
+    let at = |f: usize| order.iter().position(|u| *u == Unknown::Frame(f, 0)).expect("free");
+    let moved = truth[45].inverse() * problem.frames[45].pose;
+    let e = nalgebra::DVector::from_iterator(
+        6 * frames.len(),
+        frames.iter().flat_map(|&f| error(&problem.frames[f].pose, &(truth[f] * moved)).iter().copied().collect::<Vec<_>>()),
+    );
+    let of_frames =
+        DMatrix::from_fn(6 * frames.len(), 6 * frames.len(), |i, j| inverse[(at(frames[i / 6]) + i % 6, at(frames[j / 6]) + j % 6)]);
+    let expected = e.dot(&(of_frames.try_inverse().expect("positive") * &e));
+    assert!((found.joint.value / expected - 1.0).abs() < 1e-3, "{} {expected}", found.joint.value);
+    let too_little = CovarianceOptions { max_bytes: 1000, ..options };
+    assert!(matches!(covariance(&problem, &too_little), Err(CovarianceError::TooLarge { allowed: 1000, .. })));
 }
 
 #[test]
