@@ -74,6 +74,7 @@ fn with_known<'a>(
     let mut adjustment = last(&mut model, Some(&known), options)?;
     let mut rejected = Vec::new();
     loop {
+        known.keep_oriented(&model);
         known.update_picked(&model);
         let quality = if model.oriented_frames().is_empty() {
             Err(CovarianceError::Singular)

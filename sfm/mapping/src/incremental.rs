@@ -155,8 +155,12 @@ pub(crate) fn settle(model: &mut Model, known: Option<&Known>, options: &OrientO
                 break;
             }
         }
-        if removed == 0 || rounds >= MAX_ROUNDS {
+        if removed == 0 {
             return Ok(summary);
+        }
+        if rounds >= MAX_ROUNDS {
+            // What is told of the adjustment is of what is left.
+            return adjust_all(model, known, Effort::last(options), options);
         }
     }
 }

@@ -100,6 +100,11 @@ impl Known {
         self.bars.iter().map(|bar| bar.given).collect()
     }
 
+    /// Forgets baselines of images that lost their pose: what remains stands in the problem one by one.
+    pub(crate) fn keep_oriented(&mut self, model: &Model) {
+        self.baselines.retain(|b| model.is_oriented(b.images.0) && model.is_oriented(b.images.1));
+    }
+
     /// Puts picked points where the poses as they are now see them.
     pub(crate) fn update_picked(&mut self, model: &Model) {
         for bar in &mut self.bars {
