@@ -17,6 +17,7 @@ mod otsu;
 mod preprocess;
 pub mod quadtree;
 pub mod train;
+mod vote;
 
 pub use bits::BitMask;
 pub use canny::{CannyThresholds, canny};
@@ -29,3 +30,4 @@ pub use ml::{CellMask, CleanUp, MAX_LEVELS, MlMask, MlOptions, Route, WorkingSiz
 pub use morphology::{close, dilate, erode};
 pub use otsu::{Otsu, otsu};
 pub use preprocess::{Preprocessing, preprocess};
+pub use vote::{Affine, Glimpse, Neighbour, motion, vote};
