@@ -72,19 +72,26 @@ impl Response {
         Self { gain: balance.map(|b| b * exposure), crosstalk: options.crosstalk, noise: options.noise }
     }
 
+    /// Grey values of 255, neither rounded nor with noise.
+    pub fn grey(&self, light: [f32; 3]) -> [f32; 3] {
+        let mixed = mix_channels(light, self.crosstalk);
+        std::array::from_fn(|c| {
+            let value = (mixed[c] * self.gain[c]).clamp(0.0, 1.0);
+            GAMMA[(value.sqrt() * STEPS as f32 + 0.5) as usize]
+        })
+    }
+
     /// A row of bytes from a row of light. `key` seeds the noise of the row.
     pub fn row(&self, light: &[[f32; 3]], key: u64, out: &mut [[u8; 3]]) {
         let mut random = Random::new(mix(key));
         for (light, out) in light.iter().zip(out) {
             let bits = if self.noise > 0.0 { random.bits() } else { 0 };
-            let mixed = mix_channels(*light, self.crosstalk);
+            let greys = self.grey(*light);
             for c in 0..3 {
-                let value = (mixed[c] * self.gain[c]).clamp(0.0, 1.0);
-                let grey = GAMMA[(value.sqrt() * STEPS as f32 + 0.5) as usize];
                 // Shot noise grows with the root of the light and gamma takes as much away: even over the grey values, but for the
                 // darkest, where the electronics' own noise is left.
                 let noise = self.noise * gauss(bits >> (12 * c));
-                out[c] = (grey + noise + 0.5).clamp(0.0, 255.0) as u8;
+                out[c] = (greys[c] + noise + 0.5).clamp(0.0, 255.0) as u8;
             }
         }
     }

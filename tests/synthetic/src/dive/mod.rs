@@ -15,6 +15,7 @@ mod snow;
 #[cfg(test)]
 mod tests;
 mod truth;
+mod visible;
 
 pub use options::{CameraOptions, DiveOptions, PortKind, PortOptions, ResponseOptions, RigOptions};
 pub use picks::{PICK_SIGMA_PX, Pick};

@@ -5,6 +5,7 @@ use super::moving::Moving;
 use super::scene::DiveScene;
 use super::shade::{Arriving, Light, Surface, haze_up_to};
 use super::snow::add_snow;
+use super::visible::{Apart, visible};
 use crate::appearance::{Response, albedo};
 use crate::optics::Window;
 use crate::random::mix;
@@ -27,7 +28,7 @@ pub struct DiveImage {
     pub exposure: usize,
     /// The frame.
     pub rgb: Raster<[u8; 3]>,
-    /// True mask: 255 where something of the scene that stays is seen, 0 for water and what moves.
+    /// True mask: 255 where something of the scene that stays can be told from water, 0 for water, what moves, and what the water hides.
     pub mask: Mask,
     /// What each pixel shows: the numbers of [`Label`].
     pub labels: Raster<u8>,
@@ -44,6 +45,7 @@ pub const NO_FACE: u32 = u32::MAX;
 #[derive(Clone, Copy)]
 struct Seen {
     light: Arriving,
+    apart: Apart,
     label: Label,
     depth: f32,
     face: u32,
@@ -53,6 +55,7 @@ struct Seen {
 #[derive(Default)]
 struct Band {
     light: Vec<Arriving>,
+    apart: Vec<Apart>,
     labels: Vec<u8>,
     depth: Vec<f32>,
     faces: Vec<u32>,
@@ -96,21 +99,24 @@ impl DiveScene {
             let mut all = Band { light: Vec::with_capacity(len), ..Band::default() };
             for band in bands {
                 all.light.extend(band.light);
+                all.apart.extend(band.apart);
                 all.labels.extend(band.labels);
                 all.depth.extend(band.depth);
                 all.faces.extend(band.faces);
             }
             all
         };
-        let Band { light, labels, depth, faces } = whole(width * height);
+        let Band { light, apart, labels, depth, faces } = whole(width * height);
         let raster = "a band has the width of the frame";
         let depth = Raster::from_vec(width, height, depth).expect(raster);
         let labels = Raster::from_vec(width, height, labels).expect(raster);
+        let (frame, response) = shot.develop(&light, &depth, exposure);
+        let is_static: Vec<bool> = labels.data().iter().map(|&label| Label::ALL[usize::from(label)].is_static()).collect();
         DiveImage {
             camera,
             exposure,
-            rgb: shot.expose(light, &depth, exposure),
-            mask: labels.map(|&label| if Label::ALL[usize::from(label)].is_static() { 255 } else { 0 }),
+            rgb: shot.expose(&frame, width, &response, exposure),
+            mask: visible(&light, &apart, &is_static, width, &response),
             labels,
             depth,
             faces: Raster::from_vec(width, height, faces).expect(raster),
@@ -123,7 +129,7 @@ impl Shot<'_> {
     fn band(&self, top: usize) -> Band {
         let (width, height) = (self.dive.options.rig.width as usize, self.dive.options.rig.height as usize);
         let rows = TILE.min(height - top);
-        let nothing = Seen { light: Arriving::default(), label: Label::Water, depth: 0.0, face: NO_FACE };
+        let nothing = Seen { light: Arriving::default(), apart: Apart::default(), label: Label::Water, depth: 0.0, face: NO_FACE };
         let mut seen = vec![nothing; width * rows];
         for left in (0..width).step_by(TILE) {
             let tile = self.tile(left, top);
@@ -134,6 +140,7 @@ impl Shot<'_> {
         }
         Band {
             light: seen.iter().map(|s| s.light).collect(),
+            apart: seen.iter().map(|s| s.apart).collect(),
             labels: seen.iter().map(|s| s.label as u8).collect(),
             depth: seen.iter().map(|s| s.depth).collect(),
             faces: seen.iter().map(|s| s.face).collect(),
@@ -198,12 +205,15 @@ impl Shot<'_> {
             } else if hits.triangle[i] != HitPacket::NONE {
                 self.surface(&origin, &direction, hits.triangle[i])
             } else {
-                Seen { light: Arriving::default(), label: Label::Water, depth: 0.0, face: NO_FACE }
+                Seen { light: Arriving::default(), apart: Apart::default(), label: Label::Water, depth: 0.0, face: NO_FACE }
             };
             let distance = (seen.label != Label::Water).then_some(hits.distance[i].min(moving_hits.distance[i]));
             let veil = self.light.veil(origin.z, direction.z, distance);
-            let haze = haze_up_to(&haze, distance.unwrap_or(f32::INFINITY));
+            let endless = self.light.veil(origin.z, direction.z, None);
+            let (haze, all_haze) = (haze_up_to(&haze, distance.unwrap_or(f32::INFINITY)), haze_up_to(&haze, f32::INFINITY));
             for c in 0..3 {
+                seen.apart.own[c] = seen.light.straight[c];
+                seen.apart.water[c] = endless[c] + all_haze[c];
                 seen.light.straight[c] += veil[c] + haze[c];
             }
             seen
@@ -220,7 +230,13 @@ impl Shot<'_> {
         let normal = facing(hit.shading_normal.cast(), direction);
         let open = self.dive.sky.at(&point.cast(), &normal);
         let light = self.arriving(&point, normal, colour, open, hit.distance as f32);
-        Seen { light, label: part.label, depth: self.depth(&point), face: self.first_faces[hit.part as usize] + hit.face }
+        Seen {
+            light,
+            apart: Apart::default(),
+            label: part.label,
+            depth: self.depth(&point),
+            face: self.first_faces[hit.part as usize] + hit.face,
+        }
     }
 
     fn moving_surface(&self, origin: &Vector3<f32>, direction: &Vector3<f32>, triangle: u32) -> Seen {
@@ -232,7 +248,7 @@ impl Shot<'_> {
         let footprint = hit.distance as f32 / self.px_per_rad;
         let colour = albedo(&in_body, &part.material, &self.dive.world.panels, footprint, self.dive.options.seed as u32);
         let light = self.arriving(&point, facing(hit.shading_normal.cast(), direction), colour, 1.0, hit.distance as f32);
-        Seen { light, label: part.label, depth: self.depth(&point), face: NO_FACE }
+        Seen { light, apart: Apart::default(), label: part.label, depth: self.depth(&point), face: NO_FACE }
     }
 
     fn arriving(&self, point: &Vector3<f64>, normal: Vector3<f32>, albedo: [f32; 3], open: f32, distance: f32) -> Arriving {
@@ -244,8 +260,8 @@ impl Shot<'_> {
         (point - self.centre).dot(&self.world_from_cam.column(2)) as f32
     }
 
-    /// From light to bytes: what the water spreads, specks, blur of the lens, exposure, noise.
-    fn expose(&self, light: Vec<Arriving>, depth: &Raster<f32>, exposure: usize) -> Raster<[u8; 3]> {
+    /// The light on the sensor, with what the water spreads, specks and the blur of the lens; and the camera's settings for it.
+    fn develop(&self, light: &[Arriving], depth: &Raster<f32>, exposure: usize) -> (Vec<[f32; 3]>, Response) {
         let (width, options) = (depth.width(), &self.dive.options);
         let mut frame: Vec<[f32; 3]> = light.iter().map(|l| l.straight).collect();
         if self.dive.water.is_some() {
@@ -255,8 +271,13 @@ impl Shot<'_> {
         add_snow(self.dive, &self.light, self.camera, exposure, depth, &mut frame);
         blur(&mut frame, width, options.response.blur_px);
         let response = Response::new(&options.response, &frame, self.balance(exposure));
-        let key = mix(options.seed ^ mix((self.camera as u64) << 32 | exposure as u64));
-        let mut rgb = Raster::filled(width, depth.height(), [0; 3]);
+        (frame, response)
+    }
+
+    /// From light to bytes, with the noise of the sensor.
+    fn expose(&self, frame: &[[f32; 3]], width: usize, response: &Response, exposure: usize) -> Raster<[u8; 3]> {
+        let key = mix(self.dive.options.seed ^ mix((self.camera as u64) << 32 | exposure as u64));
+        let mut rgb = Raster::filled(width, frame.len() / width, [0; 3]);
         rgb.data_mut().par_chunks_mut(width).zip(frame.par_chunks(width)).enumerate().for_each(|(y, (out, row))| {
             response.row(row, mix(key ^ y as u64), out);
         });
