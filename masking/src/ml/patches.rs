@@ -4,7 +4,7 @@ use super::Logits;
 use super::maps::normalised;
 use crate::quadtree::Patch;
 use imaging::resize_area_rgb;
-use models::{InputCard, Model, ModelError};
+use models::{InputCard, Model, ModelError, Tensor};
 use rayon::prelude::*;
 use scene::Raster;
 
@@ -51,8 +51,7 @@ impl Logits for Batches<'_> {
                 let mut values = Vec::with_capacity(patches.len() * 3 * card.input.width * card.input.height);
                 patches.iter().for_each(|&patch| append_patch(image, patch, &card.input, &mut values));
                 let found = self.model.run([patches.len(), 3, card.input.height, card.input.width], &values, &[&card.output])?;
-                let rows = found[0].data.as_chunks::<2>().0;
-                Ok(rows.iter().map(|row| logit(row, structure)).collect())
+                Ok(rows(&found[0], patches.len(), &card.output)?.iter().map(|row| logit(row, structure)).collect())
             })
             .collect();
         let mut logits = Vec::with_capacity(patches.len());
@@ -61,6 +60,18 @@ impl Logits for Batches<'_> {
         }
         Ok(logits)
     }
+}
+
+/// One row of two values a patch. A network whose axes are of any length says only here how many classes it has.
+fn rows<'t>(found: &'t Tensor, patches: usize, output: &str) -> Result<&'t [[f32; 2]], ModelError> {
+    let wrong = |reason: String| ModelError::Shape { model: output.into(), reason };
+    if found.shape != [patches, 2] {
+        return Err(wrong(format!("it gives {:?} for {patches} patches; [{patches}, 2] is needed", found.shape)));
+    }
+    if found.data.iter().any(|v| v.is_nan()) {
+        return Err(wrong("it gives values that are no numbers".to_owned()));
+    }
+    Ok(found.data.as_chunks::<2>().0)
 }
 
 /// The logit of structure from logits or probabilities of both classes.
@@ -83,6 +94,18 @@ mod tests {
         // Larger patches are shown as they are.
         assert_eq!(window(Patch { level: 2, column: 1, row: 3 }, 1920, 1200, 0.025), [480, 960, 900, 1200]);
         assert_eq!(window(Patch::ROOT, 5, 3, 1.0), [0, 5, 0, 3]);
+    }
+
+    #[test]
+    fn other_numbers_of_classes_and_no_numbers_are_refused() {
+        let tensor = |shape: &[usize], value: f32| Tensor { shape: shape.to_vec(), data: vec![value; shape.iter().product()] };
+        assert_eq!(rows(&tensor(&[2, 2], 0.5), 2, "logits").expect("two classes"), [[0.5; 2]; 2]);
+        for (shape, value, expected) in
+            [(&[2, 3][..], 0.5, "[2, 3]"), (&[2, 1], 0.5, "[2, 1]"), (&[4], 0.5, "[4]"), (&[2, 2], f32::NAN, "no numbers")]
+        {
+            let error = rows(&tensor(shape, value), 2, "logits").expect_err("refused").to_string();
+            assert!(error.contains(expected) && error.contains("logits"), "{error}");
+        }
     }
 
     #[test]
