@@ -53,13 +53,17 @@ pub fn find(folders: &[PathBuf]) -> Result<(Vec<Labelled>, Vec<PathBuf>)> {
 /// Deeper folders are not looked into: links may go round.
 const MAX_DEPTH: usize = 16;
 
-fn walk(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<()> {
+pub(crate) fn walk(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<()> {
     let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
     let mut paths = entries.map(|e| Ok(e?.path())).collect::<std::io::Result<Vec<_>>>().with_context(|| folder.display().to_string())?;
     paths.sort();
     for path in paths {
+        if is_hidden(&path) {
+            continue;
+        }
         if path.is_dir() {
-            if depth < MAX_DEPTH {
+            // The output of a run holds no labels.
+            if depth < MAX_DEPTH && !path.join("run.toml").is_file() {
                 walk(&path, depth + 1, files)?;
             }
         } else {
@@ -69,11 +73,15 @@ fn walk(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-fn ending(path: &Path) -> String {
+fn is_hidden(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
+}
+
+pub(crate) fn ending(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-fn is_image(path: &Path) -> bool {
+pub(crate) fn is_image(path: &Path) -> bool {
     ["jpg", "jpeg", "png", "tif", "tiff", "bmp"].contains(&ending(path).as_str())
 }
 
@@ -207,6 +215,11 @@ mod tests {
         write(at, "structure/5.png", &png(8, 4));
         write(at, "water/6.png", &png(8, 4));
         write(at, "z/7.png", &png(8, 4));
+        // The output of a run is passed over.
+        write(at, "b/out/run.toml", b"");
+        write(at, "b/out/.hashes.json", b"{}");
+        write(at, "b/out/report.json", b"{}");
+        write(at, "b/out/masks-compared/ip/2.png", &png(8, 4));
         let (found, without) = find(&[at.to_path_buf()]).expect("found");
         assert_eq!(found.iter().map(share).collect::<Vec<_>>(), [1.0, 0.0, 0.5, 0.25, 1.0, 0.0]);
         assert_eq!(without, [at.join("z/7.png")]);

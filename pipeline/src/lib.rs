@@ -14,6 +14,7 @@ pub mod init;
 pub mod labels;
 pub mod mask_sheet;
 pub mod masker;
+pub mod moving;
 pub mod plan;
 pub mod progress;
 pub mod recipe;

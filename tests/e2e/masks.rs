@@ -145,3 +145,99 @@ fn labels_that_teach_nothing_are_told() {
     let (_, error) = dive.fails(&["train", ".", "--out", "mine.bin"]);
     assert!(error.contains(".onnx"), "{error}");
 }
+
+/// Intersection over union of the masks below a folder with the truth, over all images together.
+fn agreement(dive: &Dive, masks: &str) -> f64 {
+    let (mut common, mut either) = (0u32, 0u32);
+    for (name, truth) in tree(&dive.path("truth/masks")) {
+        let found = imaging::decode_grey_u8(&std::fs::read(dive.path(&format!("{masks}/{name}"))).unwrap()).unwrap();
+        let truth = imaging::decode_grey_u8(&truth).unwrap();
+        common += truth.data().iter().zip(found.data()).filter(|(t, f)| **t > 127 && **f > 127).count() as u32;
+        either += truth.data().iter().zip(found.data()).filter(|(t, f)| **t > 127 || **f > 127).count() as u32;
+    }
+    f64::from(common) / f64::from(either)
+}
+
+/// Masks from files, that of one exposure wrong: the vote of its neighbours mends it, and leaves true masks as they are.
+#[test]
+fn a_wrong_mask_of_a_single_exposure_is_overruled_by_its_neighbours() {
+    let mut options = DiveOptions::small(6, 320, 200);
+    // 5 degrees from exposure to exposure, as `sfm synth` does.
+    options.motion.arc_deg = 25.0;
+    let dive = labelled_dive(&options);
+    let with = |vote: u32, out: &str, threads: &str| {
+        let text = DIVE.replace("C1\"", "C1\"\nmask = \"drawn/C1/{stem}.png\"").replace("C2\"", "C2\"\nmask = \"drawn/C2/{stem}.png\"");
+        dive.write("dive.toml", &format!("{text}[mask]\nvote = {vote}\n"));
+        dive.ok(&["mask", "--out", out, "--threads", threads]);
+        agreement(&dive, &format!("{out}/files"))
+    };
+    for (name, bytes) in tree(&dive.path("truth/masks")) {
+        let path = dive.path("drawn").join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
+    // Parallax moves the border of true masks by a pixel here and there.
+    let harmless = with(1, "true", "2");
+    assert!(harmless > 0.995, "{harmless}");
+    let empty = imaging::encode_png_grey(&scene::Raster::filled(320, 200, 0)).unwrap();
+    std::fs::write(dive.path("drawn/C1/0002.png"), empty).unwrap();
+    let (wrong, mended) = (with(0, "wrong", "2"), with(1, "mended", "2"));
+    // One of twelve masks is lost, a twelfth of the structure; the vote brings back what both neighbours show, which is not all at the sides.
+    assert!(wrong < 0.94 && mended > 0.96, "{wrong} {mended}");
+    with(1, "one", "1");
+    assert_eq!(tree(&dive.path("one")), tree(&dive.path("mended")), "the same with one thread");
+}
+
+#[test]
+fn what_moves_is_cut_out_of_the_masks_of_every_strategy() {
+    let dive = labelled_dive(&DiveOptions::small(2, 320, 200));
+    std::fs::create_dir_all(dive.path("moving/C1")).unwrap();
+    dive.write("moving/C1/0001.json", r#"{"shapes": [{"label": "tether", "points": [[0, 0], [320, 100]], "shape_type": "rectangle"}]}"#);
+    dive.write("moving/C1/7.json", r#"{"shapes": [{"label": "tether", "points": [[0, 0], [320, 100]], "shape_type": "rectangle"}]}"#);
+    let upper_half = |strategy: &str, name: &str| {
+        let mask = imaging::decode_grey_u8(&std::fs::read(dive.path(&format!("out/masks/{strategy}/{name}"))).unwrap()).unwrap();
+        mask.data()[..320 * 100].iter().filter(|v| **v > 127).count()
+    };
+    for strategy in ["none", "ip"] {
+        dive.write("dive.toml", &format!("{DIVE}[mask]\nstrategy = \"{strategy}\"\nmoving = \"moving\"\n"));
+        let output = dive.sfm(&["run", "--until", "mask", "--json"]);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && error.contains("7.json") && error.contains("no image of the dive"), "{error}");
+        assert_eq!(upper_half(strategy, "C1/0001.png"), 0);
+        let ratios = std::fs::read_to_string(dive.path(&format!("out/masks/{strategy}/masked_ratio.csv"))).unwrap();
+        assert!(ratios.starts_with("image,masked_ratio\nC1/000"), "{ratios}");
+    }
+    assert!(upper_half("ip", "C1/0000.png") > 0, "the other images keep theirs");
+    // Other labels move: the tether stays.
+    dive.write("dive.toml", &format!("{DIVE}[mask]\nmoving = \"moving\"\nmoving_labels = [\"fish\"]\n"));
+    dive.ok(&["run", "--until", "mask"]);
+    assert!(!dive.path("out/masks/none/C1/0001.png").exists());
+    dive.write("dive.toml", &format!("{DIVE}[mask]\nmoving = \"moved\"\n"));
+    let (code, error) = dive.fails(&["run", "--until", "mask"]);
+    assert!(code == 2 && error.contains("mask.moving") && error.contains("there is no folder"), "{code} {error}");
+}
+
+/// Masks of another size and with grey values, grey images, odd sizes.
+#[test]
+fn odd_images_and_masks_are_told_or_taken() {
+    let dive = Dive::empty();
+    for folder in ["frames", "drawn"] {
+        std::fs::create_dir(dive.path(folder)).unwrap();
+    }
+    for (i, (width, height)) in [(101, 77), (101, 77), (101, 77)].into_iter().enumerate() {
+        std::fs::write(dive.path(&format!("frames/{i}.png")), support::png(width, height, i as u32)).unwrap();
+    }
+    let grey = |width: usize, height: usize, value: u8| imaging::encode_png_grey(&scene::Raster::filled(width, height, value)).unwrap();
+    std::fs::write(dive.path("drawn/0.png"), grey(101, 77, 128)).unwrap();
+    std::fs::write(dive.path("drawn/1.png"), grey(77, 101, 255)).unwrap();
+    std::fs::write(dive.path("drawn/2.png"), grey(101, 77, 127)).unwrap();
+    dive.write("dive.toml", "[[camera]]\nname = \"C1\"\nimages = \"frames\"\nmask = \"drawn/{stem}.png\"\n");
+    let output = dive.sfm(&["run", "--until", "mask", "--json"]);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && error.contains("C1/1.png") && error.contains("77 x 101"), "{error}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((report["masks"]["masks"].as_u64(), report["masks"]["empty_images"][0].as_str()), (Some(2), Some("C1/2.png")), "{report:#}");
+    let strategies = if has_runtime() { "ip,ml" } else { "ip" };
+    let text = dive.ok(&["mask", "--strategy", strategies]);
+    assert!(text.contains("ip"), "{text}");
+}

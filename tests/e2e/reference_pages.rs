@@ -43,6 +43,7 @@ fn the_examples_of_the_page_are_accepted() {
         "port.mp4",
         "reference.ply",
         "models/mine.onnx",
+        "labels/moving/C1/0001.json",
         "libonnxruntime.so",
         "positions.txt",
         "sensors.csv",

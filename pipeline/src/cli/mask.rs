@@ -43,9 +43,12 @@ pub(super) fn mask(args: &MaskArgs) -> Result<()> {
         if folder.exists() && args.out.is_none() {
             std::fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
         }
+        // Not what a vote keeps of single images.
+        let below = format!("masks/{}/", strategy.name());
         for path in stamp.outputs.keys() {
-            let inside = path.strip_prefix("masks/").unwrap_or(path);
-            copy(&config.output.join(path), &out.join(inside))?;
+            if let Some(inside) = path.strip_prefix(&below) {
+                copy(&config.output.join(path), &folder.join(inside))?;
+            }
         }
         for warning in &stamp.warnings {
             eprintln!("warning: {}: {}", warning.about, warning.message);

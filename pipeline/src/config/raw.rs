@@ -201,6 +201,9 @@ pub(super) struct RawMask {
     pub(super) route: Place<String>,
     pub(super) levels: Place<u32>,
     pub(super) combine: Place<String>,
+    pub(super) vote: Place<u32>,
+    pub(super) moving: Place<PathText>,
+    pub(super) moving_labels: Place<Vec<String>>,
 }
 
 #[derive(Debug, Default, Deserialize)]

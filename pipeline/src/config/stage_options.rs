@@ -65,6 +65,20 @@ pub struct MaskConfig {
     pub ml: MlConfig,
     /// What the masks of `ip+ml` are.
     pub combine: Combine,
+    /// Exposures on either side that vote on a mask; 0: none.
+    pub vote: u32,
+    /// What moves and is cut out of all masks.
+    pub moving: Option<MovingConfig>,
+}
+
+/// What is cut out of masks, see `pipeline::moving`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MovingConfig {
+    /// Folder of labels.
+    #[serde(skip)]
+    pub folder: PathBuf,
+    /// Labels of polygons that move; empty: those that commonly do.
+    pub labels: Vec<String>,
 }
 
 /// What is done with images before they are masked, see `masking::Preprocessing`.

@@ -6,7 +6,7 @@ use super::path_text::PathText;
 use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport};
 use super::stage_options::{
     AreaConfig, Combine, DenseQuality, DensifyConfig, EvaluateConfig, FeatureMethod, FeaturesConfig, IpConfig, Mapper, MaskConfig,
-    MaskStrategy, MatchingConfig, MlConfig, OrientConfig, OtsuOf, PairRule, Polarity, Preprocessing, ReportConfig, Route,
+    MaskStrategy, MatchingConfig, MlConfig, MovingConfig, OrientConfig, OtsuOf, PairRule, Polarity, Preprocessing, ReportConfig, Route,
 };
 use super::values::Values;
 use std::path::{Path, PathBuf};
@@ -18,6 +18,7 @@ const DOUBLE_UP_TO_MPX: f64 = 2.1;
 pub(super) fn mask(source: &mut Source<'_>, raw: &RawMask, cameras: &[CameraConfig], folder: &Path) -> MaskConfig {
     let model = existing_file(source, "mask.model", &raw.model, folder);
     let onnxruntime = existing_file(source, "mask.onnxruntime", &raw.onnxruntime, folder);
+    let moving = moving(source, raw, folder);
     let mut values = Values { source };
     let any_file = cameras.iter().any(|c| c.mask.is_some());
     let default = if any_file { MaskStrategy::Files } else { MaskStrategy::None };
@@ -47,7 +48,27 @@ pub(super) fn mask(source: &mut Source<'_>, raw: &RawMask, cameras: &[CameraConf
             levels: values.count("mask.levels", &raw.levels, 0, masking::MAX_LEVELS as u32, default.levels as u32),
         },
         combine: values.choice("mask.combine", &raw.combine, &[("and", Combine::And), ("or", Combine::Or)]).unwrap_or(Combine::And),
+        vote: values.count("mask.vote", &raw.vote, 0, MAX_VOTE, 0),
+        moving,
     }
+}
+
+/// Most exposures on either side that vote: farther ones see other places.
+const MAX_VOTE: u32 = 5;
+
+fn moving(source: &mut Source<'_>, raw: &RawMask, folder: &Path) -> Option<MovingConfig> {
+    let Some(place) = &raw.moving else {
+        if let Some(labels) = &raw.moving_labels {
+            let hint = "add `moving = \"FOLDER\"`, the folder of the label files".to_owned();
+            source.problem(Some(labels.span()), "mask.moving_labels", "without mask.moving nothing is cut out", Some(hint));
+        }
+        return None;
+    };
+    let path = folder.join(place.get_ref().as_str());
+    if !path.is_dir() {
+        source.problem(Some(place.span()), "mask.moving", format!("there is no folder {}", path.display()), None);
+    }
+    Some(MovingConfig { folder: path, labels: raw.moving_labels.as_ref().map_or_else(Vec::new, |l| l.get_ref().clone()) })
 }
 
 fn areas(values: &mut Values<'_, '_>, raw: &RawMask) -> AreaConfig {

@@ -1,8 +1,11 @@
 //! Which pixels show structure, and which only water.
 
 use super::images::{ImageEntry, ImageList};
-use crate::config::{Config, MaskStrategy, OtsuOf};
-use crate::masker::{Masker, ip_options};
+use super::mask_votes::{glimpse_file, single_file, vote_on_all};
+use super::single_masks::{Singles, thresholds};
+use crate::config::{Config, MaskStrategy};
+use crate::masker::Masker;
+use crate::moving::{self, Moving};
 use crate::stage::{Outcome, Stage, Work};
 use crate::store::{Fingerprint, Hashes, Warning};
 use anyhow::{Context, Result};
@@ -10,12 +13,25 @@ use rayon::prelude::*;
 use scene::Mask;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::fmt::Write;
 use std::path::PathBuf;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "mask", version: 2, upstream: &["ingest"], options, inputs, work };
+pub const STAGE: Stage = Stage { name: "mask", version: 3, upstream: &["ingest"], options, inputs, work };
 
 fn options(config: &Config) -> Value {
+    let mut options = single_options(config);
+    if config.mask.vote > 0 && config.mask.strategy != MaskStrategy::None {
+        options["vote"] = json!(config.mask.vote);
+    }
+    if let Some(moving) = &config.mask.moving {
+        options["moving"] = json!(moving);
+    }
+    options
+}
+
+/// What the mask of a single image depends on.
+pub(super) fn single_options(config: &Config) -> Value {
     let mask = &config.mask;
     let mut options = json!({"strategy": mask.strategy});
     if mask.strategy.has_ip() || mask.strategy.has_ml() {
@@ -34,26 +50,32 @@ fn options(config: &Config) -> Value {
     options
 }
 
-/// Every file that the patterns could mean, or the model with its card.
+/// Every file that the patterns could mean, or the model with its card; and the labels of what moves.
 fn inputs(config: &Config, hashes: &Hashes) -> BTreeMap<String, String> {
+    let mut inputs = BTreeMap::new();
     if config.mask.strategy.has_ml() {
-        return match &config.mask.ml.model {
+        inputs = match &config.mask.ml.model {
             Some(model) => hashes.of_files(vec![("model".to_owned(), model.clone()), ("card".to_owned(), model.with_extension("toml"))]),
             None => BTreeMap::from([("model".to_owned(), models::sha256(models::BUILT_IN_CARD.as_bytes()))]),
         };
     }
-    if config.mask.strategy != MaskStrategy::Files {
-        return BTreeMap::new();
-    }
     let mut files: Vec<(String, PathBuf)> = Vec::new();
-    for camera in &config.cameras {
-        let Some(pattern) = &camera.mask else { continue };
-        // Folders may hold signs that a pattern takes for its own; the stem stands for any text.
-        let parts: Vec<String> = pattern.file("{stem}").to_string_lossy().split("{stem}").map(glob::Pattern::escape).collect();
-        let found = glob::glob(&parts.join("*")).into_iter().flatten().flatten();
-        files.extend(found.map(|f| (format!("{}/{}", camera.name, f.file_name().unwrap_or_default().to_string_lossy()), f)));
+    if config.mask.strategy == MaskStrategy::Files {
+        for camera in &config.cameras {
+            let Some(pattern) = &camera.mask else { continue };
+            // Folders may hold signs that a pattern takes for its own; the stem stands for any text.
+            let parts: Vec<String> = pattern.file("{stem}").to_string_lossy().split("{stem}").map(glob::Pattern::escape).collect();
+            let found = glob::glob(&parts.join("*")).into_iter().flatten().flatten();
+            files.extend(found.map(|f| (format!("{}/{}", camera.name, f.file_name().unwrap_or_default().to_string_lossy()), f)));
+        }
     }
-    hashes.of_files(files)
+    if let Some(moving) = &config.mask.moving {
+        // A folder that cannot be read is told when the stage runs.
+        let labels = moving::files(&moving.folder).unwrap_or_default();
+        files.extend(labels.into_iter().map(|(name, path)| (format!("moving/{name}"), path)));
+    }
+    inputs.extend(hashes.of_files(files));
+    inputs
 }
 
 /// Where the mask of an image lies.
@@ -89,152 +111,115 @@ pub fn is_empty(work: &Work<'_>, image: &ImageEntry) -> bool {
 
 fn work(work: &Work<'_>) -> Result<Outcome> {
     let list = ImageList::load(work)?;
-    let strategy = work.config.mask.strategy;
-    if strategy == MaskStrategy::None {
+    let config = &work.config.mask;
+    let strategy = config.strategy;
+    let moving = config.moving.as_ref().map_or_else(|| Ok(Moving::default()), |m| Moving::read(&m.folder, &m.labels, &list))?;
+    if strategy == MaskStrategy::None && config.moving.is_none() {
         return Ok(Outcome { figures: json!({"strategy": strategy, "note": "none"}), warnings: Vec::new() });
     }
-    let masker = Masker::new(&work.config.mask)?;
+    let masker = Masker::new(config)?;
     let thresholds = thresholds(work, &list, &masker)?;
+    let mut warnings: Vec<Warning> = moving
+        .unusable
+        .iter()
+        .map(|(file, reason)| Warning { about: file.clone(), message: format!("nothing is cut out of masks by it: {reason}") })
+        .collect();
+    let singles = Singles { work, list: &list, masker, thresholds, moving };
+    let file = |image: &ImageEntry| mask_file(&list, strategy, image);
+    let votes = config.vote > 0 && strategy != MaskStrategy::None;
     work.progress.begin("masks", list.images.len());
-    let made: Vec<Result<Result<f64, Warning>>> = list
+    let made: Vec<Result<Option<Result<Fingerprint, String>>>> = list
         .images
         .par_iter()
         .map(|image| {
-            let made = one_mask(work, &list, image, &masker, thresholds[image.camera]);
             work.progress.advance(1);
-            made
+            if votes {
+                let glimpse = glimpse_file(&list, image);
+                return singles.make(image, &single_file(&list, image, strategy.name()), Some(&glimpse), false).map(Some);
+            }
+            let all_takes_part = strategy == MaskStrategy::None && singles.moving.fingerprint(image).is_none();
+            if all_takes_part { Ok(None) } else { singles.make(image, &file(image), None, true).map(Some) }
         })
         .collect();
-    let (mut shares, mut warnings, mut empty) = (Vec::new(), Vec::new(), Vec::new());
-    let mut per_camera = vec![(0.0, 0usize); list.cameras.len()];
-    for (image, mask) in list.images.iter().zip(made) {
-        match mask? {
-            Ok(share) => {
-                shares.push(share);
-                per_camera[image.camera].0 += 1.0 - share;
-                per_camera[image.camera].1 += 1;
-                if share == 0.0 {
-                    empty.push(image.name.clone());
-                }
+    let mut keys = Vec::with_capacity(made.len());
+    for (image, made) in list.images.iter().zip(made) {
+        keys.push(match made? {
+            None => None,
+            Some(Ok(key)) => Some(key),
+            Some(Err(message)) => {
+                warnings.push(Warning { about: image.name.clone(), message: format!("{message}; all of the image takes part") });
+                None
             }
-            Err(warning) => warnings.push(warning),
+        });
+    }
+    if votes {
+        vote_on_all(&singles, &keys, &file)?;
+    }
+    let shares = shares(work, &list, &keys, &file)?;
+    let mut figures = figures(&list, &shares, strategy);
+    if let Some((name, sha256)) = singles.masker.model() {
+        figures["classifier"] = json!({"name": name, "sha256": sha256, "runtime": singles.masker.library()});
+    }
+    write_ratios(work, &list, &shares)?;
+    Ok(Outcome { figures, warnings })
+}
+
+/// The share of structure of each mask; none where an image has no mask.
+fn shares(
+    work: &Work<'_>,
+    list: &ImageList,
+    keys: &[Option<Fingerprint>],
+    file: &(dyn Fn(&ImageEntry) -> String + Sync),
+) -> Result<Vec<Option<f64>>> {
+    let share = |(image, key): (&ImageEntry, &Option<Fingerprint>)| -> Result<Option<f64>> {
+        if key.is_none() {
+            return Ok(None);
+        }
+        // Also of a mask that an earlier run made.
+        let bytes = std::fs::read(work.store.path(&file(image)))?;
+        Ok(Some(masking::structure_share(&imaging::decode_grey_u8(&bytes)?)))
+    };
+    list.images.par_iter().zip(keys).map(share).collect()
+}
+
+fn figures(list: &ImageList, shares: &[Option<f64>], strategy: MaskStrategy) -> Value {
+    let mut per_camera = vec![(0.0, 0usize); list.cameras.len()];
+    let (mut empty, mut masks, mut masked) = (Vec::new(), 0usize, 0.0);
+    for (image, share) in list.images.iter().zip(shares) {
+        let Some(share) = share else { continue };
+        (masks, masked) = (masks + 1, masked + 1.0 - share);
+        let (sum, n) = &mut per_camera[image.camera];
+        (*sum, *n) = (*sum + 1.0 - share, *n + 1);
+        if *share == 0.0 {
+            empty.push(image.name.clone());
         }
     }
-    let masked_ratio = (!shares.is_empty()).then(|| 1.0 - shares.iter().sum::<f64>() / shares.len() as f64);
-    let note = format!("{} masks, {:.0} % of the pixels masked", shares.len(), 100.0 * masked_ratio.unwrap_or(0.0));
-    let of_camera = |(name, (sum, n)): (&String, &(f64, usize))| (name.clone(), (*n > 0).then(|| sum / *n as f64).into());
+    let ratio = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
+    let masked_ratio = ratio(masked, masks);
+    let of_camera = |(name, (sum, n)): (&String, &(f64, usize))| (name.clone(), ratio(*sum, *n).into());
     let per_camera: serde_json::Map<String, Value> = list.cameras.iter().map(|c| &c.name).zip(&per_camera).map(of_camera).collect();
-    let mut figures = json!({
+    json!({
         "strategy": strategy,
-        "masks": shares.len(),
+        "masks": masks,
         "empty": empty.len(),
         "empty_images": empty,
         "masked_ratio": masked_ratio,
         "masked_ratio_by_camera": per_camera,
-        "note": note,
-    });
-    if let Some((name, sha256)) = masker.model() {
-        figures["classifier"] = json!({"name": name, "sha256": sha256, "runtime": masker.library()});
-    }
-    Ok(Outcome { figures, warnings })
+        "note": format!("{masks} masks, {:.0} % of the pixels masked", 100.0 * masked_ratio.unwrap_or(0.0)),
+    })
 }
 
-/// The threshold of each camera, where it is of the whole dive.
-fn thresholds(work: &Work<'_>, list: &ImageList, masker: &Masker<'_>) -> Result<Vec<Option<u8>>> {
-    let config = &work.config.mask;
-    if !config.strategy.has_ip() || config.ip.otsu == OtsuOf::Image {
-        return Ok(vec![None; list.cameras.len()]);
-    }
-    work.progress.begin("grey values", list.images.len());
-    let histograms: Vec<Result<Option<[u64; 256]>>> = list
-        .images
-        .par_iter()
-        .map(|image| {
-            let rgb = imaging::decode_rgb(&list.bytes(work, image)?);
-            work.progress.advance(1);
-            // A damaged image is told when its mask is made.
-            let Ok(rgb) = rgb else { return Ok(None) };
-            let options = ip_options(&config.ip, &config.areas, rgb.width(), rgb.height());
-            Ok(Some(masking::histogram(&masker.prepared(rgb), &options)))
-        })
-        .collect();
-    let mut sums = vec![[0u64; 256]; list.cameras.len()];
-    for (image, histogram) in list.images.iter().zip(histograms) {
-        if let Some(histogram) = histogram? {
-            sums[image.camera].iter_mut().zip(histogram).for_each(|(sum, n)| *sum += n);
+/// Where the masked ratio of each image stands.
+fn ratios_file(strategy: MaskStrategy) -> String {
+    format!("masks/{}/masked_ratio.csv", strategy.name())
+}
+
+fn write_ratios(work: &Work<'_>, list: &ImageList, shares: &[Option<f64>]) -> Result<()> {
+    let mut text = String::from("image,masked_ratio\n");
+    for (image, share) in list.images.iter().zip(shares) {
+        if let Some(share) = share {
+            let _ = writeln!(text, "{},{:.4}", image.name, 1.0 - share);
         }
     }
-    Ok(sums.iter().map(|histogram| masking::otsu(histogram).map(|split| split.threshold)).collect())
-}
-
-/// Makes or takes over a mask; gives its share of structure, or why the image has none.
-fn one_mask(
-    work: &Work<'_>,
-    list: &ImageList,
-    image: &ImageEntry,
-    masker: &Masker<'_>,
-    threshold: Option<u8>,
-) -> Result<Result<f64, Warning>> {
-    let path = mask_file(list, work.config.mask.strategy, image);
-    let made = match work.config.mask.strategy {
-        MaskStrategy::Files => from_file(work, image, &path)?,
-        _ => from_image(work, list, image, &path, masker, threshold)?,
-    };
-    if let Err(message) = made {
-        return Ok(Err(Warning { about: image.name.clone(), message: format!("{message}; all of the image takes part") }));
-    }
-    // Also of a mask that an earlier run made.
-    let bytes = std::fs::read(work.store.path(&path))?;
-    Ok(Ok(masking::structure_share(&imaging::decode_grey_u8(&bytes)?)))
-}
-
-fn from_file(work: &Work<'_>, image: &ImageEntry, path: &str) -> Result<Result<(), String>> {
-    let Some(pattern) = &work.config.cameras[image.camera].mask else { return Ok(Err("its camera has no masks".to_owned())) };
-    let bytes = match std::fs::read(pattern.file(&image.stem)) {
-        Ok(bytes) => bytes,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Err("it has no mask file".to_owned())),
-        Err(e) => return Ok(Err(format!("its mask cannot be read: {}", e.kind()))),
-    };
-    let size = (image.width as usize, image.height as usize);
-    let mask = imaging::decode_grey_u8(&bytes)
-        .map_err(|e| e.to_string())
-        .and_then(|grey| masking::mask_from_file(&grey, size).map_err(|e| e.to_string()));
-    match mask {
-        Ok(mask) => {
-            work.files.item::<anyhow::Error>(path, Fingerprint::of_bytes(&bytes), || Ok(imaging::encode_png_grey(&mask)?))?;
-            Ok(Ok(()))
-        }
-        Err(message) => Ok(Err(format!("its mask cannot be used: {message}"))),
-    }
-}
-
-fn from_image(
-    work: &Work<'_>,
-    list: &ImageList,
-    image: &ImageEntry,
-    path: &str,
-    masker: &Masker<'_>,
-    threshold: Option<u8>,
-) -> Result<Result<(), String>> {
-    let options = options(work.config).to_string();
-    let version = STAGE.version.to_le_bytes();
-    let key = Fingerprint::of_parts([
-        ("version", version.as_slice()),
-        ("options", options.as_bytes()),
-        ("image", image.content.as_bytes().as_slice()),
-        ("threshold", threshold.as_slice()),
-        ("model", masker.model().map_or("", |m| m.1).as_bytes()),
-        ("runtime", masker.library().unwrap_or_default().as_bytes()),
-    ]);
-    if work.files.reuse(path, key) {
-        return Ok(Ok(()));
-    }
-    match imaging::decode_rgb(&list.bytes(work, image)?) {
-        Ok(rgb) => {
-            let made = masker.mask(&masker.prepared(rgb), threshold).with_context(|| image.name.clone())?;
-            work.files.save(path, key, &imaging::encode_png_grey(&made.mask)?)?;
-            Ok(Ok(()))
-        }
-        Err(error) => Ok(Err(format!("it cannot be masked: {error}"))),
-    }
+    work.files.item(&ratios_file(work.config.mask.strategy), Fingerprint::of_bytes(text.as_bytes()), || Ok(text.into_bytes()))
 }
