@@ -11,11 +11,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("eval", &["scene"]),
     ("synthetic", &["scene", "imaging"]),
     ("features", &["scene", "imaging", "solve"]),
+    ("calibrate", &["scene", "imaging", "solve"]),
     ("models", &[]),
     ("masking", &["scene", "imaging", "models"]),
     ("mapping", &["scene", "solve"]),
     ("dense", &["scene", "imaging"]),
-    ("pipeline", &["scene", "imaging", "solve", "eval", "synthetic", "features", "models", "masking", "mapping", "dense"]),
+    ("pipeline", &["scene", "imaging", "solve", "eval", "synthetic", "features", "calibrate", "models", "masking", "mapping", "dense"]),
 ];
 
 #[test]
