@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, Vector2, Vector3};
 use scene::camera::{MAX_CAMERA_PARAMS, ParamKind};
 use scene::{Camera, CameraModel, Rigid3};
 use solve::adjust::{
-    AdjustOptions, AdjustSummary, Baseline, CameraBlock, Covariance, ImageObservation, Loss, PointBlock, PoseBlock, Problem, adjust,
-    covariance,
+    AdjustOptions, AdjustSummary, Baseline, CameraBlock, Covariance, CovarianceOptions, ImageObservation, PointBlock, PoseBlock, Problem,
+    adjust, covariance,
 };
 
 /// An observation is left out when its residual is larger than this many robust standard deviations: a mistake, not noise.
@@ -207,7 +207,7 @@ fn finish(
     // Exact observations have a standard deviation, if a small one.
     let sigma0_px = (square / redundancy).sqrt().max(1e-9);
     problem.observations.iter_mut().for_each(|o| o.sigma_px = sigma0_px);
-    let found = covariance(&problem, &Loss::Trivial)?;
+    let found = covariance(&problem, &CovarianceOptions::default())?;
     let rms = |camera: Option<usize>| {
         let of = || problem.observations.iter().zip(&errors).filter(|(o, _)| camera.is_none_or(|c| o.camera as usize == c));
         let count = of().count();
@@ -259,7 +259,7 @@ fn baselines(problem: &Problem) -> Result<Vec<CalibratedBaseline>, CalibrateErro
         let observed = pairs.iter().zip(&lengths).zip(weights);
         problem.baselines =
             observed.map(|((&(i, j), &length), &sigma)| Baseline { a: (frame, i as u32), b: (frame, j as u32), length, sigma }).collect();
-        let found = covariance(problem, &Loss::Trivial)?;
+        let found = covariance(problem, &CovarianceOptions::default())?;
         let variance = |(redundancy, s): (&f64, &f64)| s * s * (1.0 - redundancy) / redundancy;
         Ok(found.redundancy.iter().zip(weights).map(variance).map(|v| v.max(0.0).sqrt()).collect())
     };
