@@ -159,14 +159,14 @@ pub(in crate::format) fn drop_not_finite(mesh: &mut Mesh, dropped: &mut Dropped)
 }
 
 /// An open PLY file: the header is read, elements come one by one, so that no intermediate list is built.
-struct PlyReader<R: BufRead> {
-    reader: Reader<Counted<R>>,
-    header: Header,
+pub(super) struct PlyReader<R: BufRead> {
+    pub(super) reader: Reader<Counted<R>>,
+    pub(super) header: Header,
     line: u64,
 }
 
 impl<R: BufRead> PlyReader<R> {
-    fn open(input: R) -> Result<Self, FormatError> {
+    pub(super) fn open(input: R) -> Result<Self, FormatError> {
         let mut reader = Reader::new(Counted::new(input));
         let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|e| {
             let what = e.to_string().replace(['\n', '\t'], " ");
@@ -176,16 +176,16 @@ impl<R: BufRead> PlyReader<R> {
         Ok(Self { reader, header, line })
     }
 
-    fn elements(&self) -> Vec<ElementDef> {
+    pub(super) fn elements(&self) -> Vec<ElementDef> {
         self.header.elements.iter().map(|(_, e)| e.clone()).collect()
     }
 
-    fn attributes(&self, element: &ElementDef) -> Result<Attributes, FormatError> {
+    pub(super) fn attributes(&self, element: &ElementDef) -> Result<Attributes, FormatError> {
         let has = Attributes::of(element.properties.iter().map(|(name, _)| name.as_str()));
         if has.positions { Ok(has) } else { Err(self.error("vertices have no x, y, z".into())) }
     }
 
-    fn error(&self, what: String) -> FormatError {
+    pub(super) fn error(&self, what: String) -> FormatError {
         match self.header.encoding {
             Encoding::Ascii => FormatError::Line { file: "PLY", line: self.line, what },
             _ => FormatError::Bytes { file: "PLY", offset: self.reader.get_ref().offset, what },
@@ -193,7 +193,7 @@ impl<R: BufRead> PlyReader<R> {
     }
 
     /// Hands every record of an element to `each`, which may refuse it.
-    fn read<E: PropertyAccess>(
+    pub(super) fn read<E: PropertyAccess>(
         &mut self,
         element: &ElementDef,
         mut each: impl FnMut(usize, E) -> Result<(), String>,
