@@ -1,12 +1,13 @@
 //! The figures of a cloud.
 
-use crate::distance::{Reference, check_mesh, check_positions, signed_to_mesh, to_cloud};
-use crate::grid::{Cells, PointGrid, occupied};
+use crate::distance::{Reference, Ruler};
+use crate::distribution::{Histogram, NormalFit, WeibullFit, fit_sample, percentiles_about};
+use crate::gather::{Gathered, gather};
+use crate::points::Points;
+use crate::region::Region;
 use crate::statistics::{percentile, sum};
-use crate::{EvalError, morton, surface};
-use nalgebra::Point3;
+use crate::{EvalError, warnings};
 use rayon::prelude::*;
-use scene::Cloud;
 use serde::Serialize;
 
 /// What to measure with.
@@ -25,6 +26,11 @@ pub struct EvalOptions {
     pub max_density_samples: usize,
     /// Most points of a mesh at which the completeness is measured.
     pub max_completeness_samples: usize,
+    /// Further thresholds of the curve, metres; a quarter, half, once, twice and four times the threshold are always there.
+    pub curve_m: Vec<f64>,
+    /// What of the reference counts for integrity and completeness. The cloud has to be cut to the same region
+    /// ([`crate::Prepared`]).
+    pub region: Option<Region>,
 }
 
 impl Default for EvalOptions {
@@ -36,6 +42,8 @@ impl Default for EvalOptions {
             grid_m: None,
             max_density_samples: 100_000,
             max_completeness_samples: 200_000,
+            curve_m: Vec::new(),
+            region: None,
         }
     }
 }
@@ -70,10 +78,22 @@ pub struct CloudMetrics {
     pub c2m_rms_m: f64,
     /// Median of |d|, metres.
     pub c2m_median_m: f64,
+    /// Median of d, metres; only against a mesh.
+    pub c2m_signed_median_m: Option<f64>,
+    /// Median absolute deviation from the median of d (of |d| against a cloud), metres; times 1.4826 it estimates the standard
+    /// deviation of a normal law (Hoehle & Hoehle, ISPRS Journal, 2009).
+    pub c2m_mad_m: f64,
     /// Largest |d|, metres.
     pub c2m_max_m: f64,
     /// Percentiles of |d|.
     pub c2m_percentiles_m: Percentiles,
+    /// Counts of d (of |d| against a cloud) in intervals of a tenth of T, out to 4 T: the same for all clouds that are measured
+    /// with one T.
+    pub c2m_histogram: Histogram,
+    /// Normal law fitted to d; `None` against a cloud and where all d are the same.
+    pub c2m_normal: Option<NormalFit>,
+    /// Weibull's law fitted to |d|, by at most 50,000 evenly spaced ranks; `None` where all |d| are the same.
+    pub c2m_weibull: Option<WeibullFit>,
     /// SNR of the paper, from 0 to 1: share of points with |d| at most T.
     pub snr: f64,
     /// SD of the paper, points per square metre: mean over the points of n / (pi R^2), n being the number of points within
@@ -96,51 +116,107 @@ pub struct CloudMetrics {
     pub completeness: f64,
     /// Harmonic mean of accuracy and completeness; 0 where both are 0.
     pub f_score: f64,
+    /// Accuracy, completeness and F-score at several thresholds, ascending.
+    pub curve: Vec<CurvePoint>,
+    /// What makes the figures doubtful.
+    pub warnings: Vec<String>,
 }
 
-/// Compares a cloud with a reference; both in metres and in the same frame.
+/// A point of the curves of Knapitsch et al. and Schoeps et al.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CurvePoint {
+    /// The threshold, metres.
+    pub threshold_m: f64,
+    /// Share of points with |d| at most the threshold.
+    pub accuracy: f64,
+    /// Share of the reference that has a point within the threshold.
+    pub completeness: f64,
+    /// Harmonic mean of both; 0 where both are 0.
+    pub f_score: f64,
+}
+
+/// What is told of each piece of a cloud when its distances are known: points, and signed or unsigned distances.
+pub type EachDistance<'a> = dyn FnMut(&[nalgebra::Point3<f64>], &[f64]) -> Result<(), EvalError> + 'a;
+
+/// Compares a cloud with a reference; both in metres and in the same frame. Holds eight bytes a point, whatever the cloud's
+/// size, besides a piece of it.
 ///
 /// # Errors
 /// [`EvalError`]: an empty cloud or reference, positions that are not finite, faces without vertices, options that are not
 /// positive, no threshold, or cells too fine for the extent.
-pub fn evaluate(cloud: &Cloud, reference: &Reference, options: &EvalOptions) -> Result<CloudMetrics, EvalError> {
+pub fn evaluate(points: &dyn Points, reference: &Reference, options: &EvalOptions) -> Result<CloudMetrics, EvalError> {
+    evaluate_each(points, reference, options, &mut |_, _| Ok(()))
+}
+
+/// As [`evaluate`], and hands over the points with their distances, in the order of the cloud.
+///
+/// # Errors
+/// As [`evaluate`], and what `each` returns.
+pub fn evaluate_each(
+    points: &dyn Points,
+    reference: &Reference,
+    options: &EvalOptions,
+    each: &mut EachDistance<'_>,
+) -> Result<CloudMetrics, EvalError> {
     let threshold = threshold(options)?;
     let radius = positive("density_radius_m", options.density_radius_m.unwrap_or(threshold))?;
     let grid = positive("grid_m", options.grid_m.unwrap_or(threshold))?;
-    if cloud.is_empty() {
-        return Err(EvalError::EmptyCloud);
-    }
-    check_positions("point", &cloud.positions, &Point3::origin())?;
-    let signed = match reference {
-        Reference::Mesh(mesh) => signed_to_mesh(&cloud.positions, mesh)?,
-        Reference::Cloud(other) => to_cloud(&cloud.positions, &other.positions)?,
+    let thresholds = curve_thresholds(threshold, options)?;
+    let ruler = Ruler::new(reference)?;
+    let Gathered {
+        distances: mut signed,
+        density_neighbours,
+        density_samples,
+        reference_squared,
+        cells_found,
+        cells_true,
+        cells_common,
+        warnings: mut doubts,
+    } = gather(points, reference, &ruler, [threshold, radius, grid, thresholds[thresholds.len() - 1]], options, each)?;
+    let has_sign = matches!(reference, Reference::Mesh(_));
+    let n = signed.len() as f64;
+    let (mean, signed_mean, squares) = (sum(&signed, f64::abs) / n, sum(&signed, |d| d) / n, sum(&signed, |d| d * d) / n);
+    let bins = |side: f64| Histogram::new(&signed, -side * 4.0 * threshold, threshold / 10.0, if side > 0.0 { 80 } else { 40 });
+    let c2m_histogram = bins(if has_sign { 1.0 } else { 0.0 });
+    signed.par_sort_unstable_by(f64::total_cmp);
+    let signed_median = percentile(&signed, 50.0);
+    let unsigned = percentiles_about(&signed, 0.0, &[25.0, 50.0, 75.0, 90.0, 95.0, 99.0, 100.0]);
+    let [p25_m, median, p75_m, p90_m, p95_m, p99_m, max] = unsigned[..] else { unreachable!("seven are asked for") };
+    let within = |t: f64| (signed.partition_point(|&d| d <= t) - signed.partition_point(|&d| d < -t)) as f64 / n;
+    let covered = |t: f64| reference_squared.iter().filter(|&&s| s <= t * t).count() as f64 / reference_squared.len() as f64;
+    let at = |threshold_m: f64| {
+        let (accuracy, completeness) = (within(threshold_m), covered(threshold_m));
+        let sum = accuracy + completeness;
+        let f_score = if sum > 0.0 { 2.0 * accuracy * completeness / sum } else { 0.0 };
+        CurvePoint { threshold_m, accuracy, completeness, f_score }
     };
-    let count = signed.len() as f64;
-    let signal: Vec<Point3<f64>> = cloud.positions.iter().zip(&signed).filter(|(_, d)| d.abs() <= threshold).map(|(p, _)| *p).collect();
-    let mut distances: Vec<f64> = signed.iter().map(|d| d.abs()).collect();
-    distances.par_sort_unstable_by(f64::total_cmp);
-    let at = |percent| percentile(&distances, percent);
-    let snr = signal.len() as f64 / count;
-    let completeness = completeness(&cloud.positions, reference, threshold, options)?;
-    let (integrity, integrity_coverage) = integrity(&signal, reference, grid, threshold)?;
+    let main = at(threshold);
+    doubts.extend(warnings::of_distances(main.accuracy, median, reference));
     Ok(CloudMetrics {
-        points: cloud.len(),
+        points: signed.len(),
         threshold_m: threshold,
-        c2m_mean_m: sum(&distances, |d| d) / count,
-        c2m_signed_mean_m: matches!(reference, Reference::Mesh(_)).then(|| sum(&signed, |d| d) / count),
-        c2m_rms_m: (sum(&distances, |d| d * d) / count).sqrt(),
-        c2m_median_m: at(50.0),
-        c2m_max_m: at(100.0),
-        c2m_percentiles_m: Percentiles { p25_m: at(25.0), p75_m: at(75.0), p90_m: at(90.0), p95_m: at(95.0), p99_m: at(99.0) },
-        snr,
-        surface_density_per_m2: surface_density(&cloud.positions, radius, options.max_density_samples),
+        c2m_mean_m: mean,
+        c2m_signed_mean_m: has_sign.then_some(signed_mean),
+        c2m_rms_m: squares.sqrt(),
+        c2m_median_m: median,
+        c2m_signed_median_m: has_sign.then_some(signed_median),
+        c2m_mad_m: percentiles_about(&signed, signed_median, &[50.0])[0],
+        c2m_max_m: max,
+        c2m_percentiles_m: Percentiles { p25_m, p75_m, p90_m, p95_m, p99_m },
+        c2m_histogram,
+        c2m_normal: if has_sign { NormalFit::new(&signed) } else { None },
+        c2m_weibull: WeibullFit::new(&fit_sample(&signed)),
+        snr: main.accuracy,
+        surface_density_per_m2: density_neighbours as f64 / density_samples as f64 / (std::f64::consts::PI * radius * radius),
         density_radius_m: radius,
-        integrity,
-        integrity_coverage,
+        integrity: cells_found as f64 / cells_true as f64,
+        integrity_coverage: cells_common as f64 / cells_true as f64,
         grid_m: grid,
-        accuracy: snr,
-        completeness,
-        f_score: if snr + completeness > 0.0 { 2.0 * snr * completeness / (snr + completeness) } else { 0.0 },
+        accuracy: main.accuracy,
+        completeness: main.completeness,
+        f_score: main.f_score,
+        curve: thresholds.into_iter().map(at).collect(),
+        warnings: doubts,
     })
 }
 
@@ -156,51 +232,12 @@ fn threshold(options: &EvalOptions) -> Result<f64, EvalError> {
     }
 }
 
-/// Counts of fixed chunks, added in order; integers, so any order would do.
-fn count(points: &[Point3<f64>], f: impl Fn(&Point3<f64>) -> usize + Sync) -> usize {
-    points.par_chunks(256).map(|chunk| chunk.iter().map(&f).sum::<usize>()).sum()
-}
-
-fn surface_density(points: &[Point3<f64>], radius: f64, max_samples: usize) -> f64 {
-    let grid = PointGrid::new(points, Cells::new(morton::bounds(points).0, radius));
-    // Every k-th point in the order of the cells: an even sample of the cloud.
-    let stride = points.len().div_ceil(max_samples.max(1));
-    let asked: Vec<_> = grid.points().iter().step_by(stride).copied().collect();
-    let neighbours = count(&asked, |p| grid.count_within(p, radius));
-    neighbours as f64 / asked.len() as f64 / (std::f64::consts::PI * radius * radius)
-}
-
-fn completeness(points: &[Point3<f64>], reference: &Reference, threshold: f64, options: &EvalOptions) -> Result<f64, EvalError> {
-    let samples = match reference {
-        Reference::Mesh(mesh) => {
-            check_mesh(mesh)?;
-            // Four samples for each disc of the threshold's radius resolve its coverage; more tell nothing new.
-            let wanted = 4.0 * surface::area(mesh) / (threshold * threshold);
-            surface::sample(mesh, (wanted as usize).clamp(1000, options.max_completeness_samples.max(1000)))
-        }
-        Reference::Cloud(other) => other.positions.clone(),
-    };
-    if samples.is_empty() {
-        return Err(EvalError::EmptyReference("the mesh has no area"));
+fn curve_thresholds(threshold: f64, options: &EvalOptions) -> Result<Vec<f64>, EvalError> {
+    let mut all = [0.25, 0.5, 1.0, 2.0, 4.0].map(|f| f * threshold).to_vec();
+    for &value in &options.curve_m {
+        all.push(positive("curve_m", value)?);
     }
-    let grid = PointGrid::new(points, Cells::new(morton::bounds(points).0, threshold));
-    Ok(count(&samples, |p| usize::from(grid.any_within(p, threshold))) as f64 / samples.len() as f64)
-}
-
-fn integrity(signal: &[Point3<f64>], reference: &Reference, grid: f64, threshold: f64) -> Result<(f64, f64), EvalError> {
-    let positions = match reference {
-        Reference::Mesh(mesh) => &mesh.vertices,
-        Reference::Cloud(other) => &other.positions,
-    };
-    let (min, max) = morton::bounds(positions);
-    // One cell is centred on the corner of the reference; whole cells are added for the points beside it.
-    let margin = (threshold / grid).ceil() * grid;
-    let cells = Cells::distinct("cells of the integrity", min.map(|c| c - margin), max.map(|c| c + margin), grid)?;
-    let truth = match reference {
-        Reference::Mesh(mesh) => surface::raster(mesh, cells)?,
-        Reference::Cloud(other) => occupied(cells, &other.positions),
-    };
-    let found = occupied(cells, signal);
-    let common = found.iter().filter(|key| truth.binary_search(key).is_ok()).count();
-    Ok((found.len() as f64 / truth.len() as f64, common as f64 / truth.len() as f64))
+    all.sort_unstable_by(f64::total_cmp);
+    all.dedup();
+    Ok(all)
 }

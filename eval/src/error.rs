@@ -62,6 +62,9 @@ pub enum EvalError {
         /// How many of each are needed.
         needed: usize,
     },
+    /// The cloud could not be read, or changed while it was.
+    #[error("{0}")]
+    Input(String),
     /// No motion aligns the positions.
     #[error("the positions lie in one place or on one line: no alignment is defined")]
     NoAlignment,

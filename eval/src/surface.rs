@@ -22,7 +22,7 @@ pub(crate) fn raster(mesh: &Mesh, cells: Cells) -> Result<Vec<u64>, EvalError> {
     };
     let lattice: f64 = mesh.faces.iter().map(steps).map(|n| (n + 1.0) * (n + 2.0) / 2.0).sum();
     if lattice > MAX_LATTICE {
-        let (min, max) = crate::morton::bounds(&mesh.vertices);
+        let (min, max) = crate::hilbert::bounds(&mesh.vertices);
         return Err(EvalError::TooFine { what: "cells of the integrity", cell_m: cells.size(), extent_m: (max - min).amax() });
     }
     let mut keys: Vec<u64> = mesh

@@ -1,39 +1,67 @@
 //! Distances to a mesh and to a cloud.
 
+use super::Reference;
 use super::nearest::Index;
 use super::pseudonormal::PseudoNormals;
 use super::triangle::{Triangle, corners};
-use crate::{EvalError, morton};
-use nalgebra::Point3;
+use crate::{EvalError, hilbert};
+use nalgebra::{Point3, Vector3};
 use scene::Mesh;
 
 /// Largest coordinate relative to the reference whose square is far from the limits of f32.
 const MAX_COORDINATE: f64 = 1e12;
 
-/// Signed distance of every point.
-pub(crate) fn signed_to_mesh(points: &[Point3<f64>], mesh: &Mesh) -> Result<Vec<f64>, EvalError> {
-    check_mesh(mesh)?;
-    let (origin, extent) = frame(&mesh.vertices);
-    check_positions("point", points, &origin)?;
-    let normals = PseudoNormals::new(mesh, &origin);
-    let triangles = mesh.faces.iter().map(|face| Triangle::new(corners(&mesh.vertices, face, &origin))).collect();
-    let index = Index::new(origin, extent, triangles);
-    Ok(index.map_nearest(points, |nearest, p| {
-        let (to_point, feature) = index.primitives[nearest].nearest(p);
-        to_point.norm() * normals.sign(mesh, nearest, feature, &to_point)
-    }))
+/// A reference that is ready to be asked.
+pub(crate) enum Ruler<'a> {
+    /// A mesh, with what tells its sides apart.
+    Mesh { mesh: &'a Mesh, index: Index<Triangle>, normals: PseudoNormals },
+    /// A cloud.
+    Cloud(Index<Vector3<f64>>),
 }
 
-/// Distance of every point to the nearest of `others`.
-pub(crate) fn to_cloud(points: &[Point3<f64>], others: &[Point3<f64>]) -> Result<Vec<f64>, EvalError> {
-    if others.is_empty() {
-        return Err(EvalError::EmptyReference("the cloud has no points"));
+impl<'a> Ruler<'a> {
+    /// Checks a reference and prepares it.
+    pub fn new(reference: &'a Reference) -> Result<Self, EvalError> {
+        match reference {
+            Reference::Mesh(mesh) => {
+                check_mesh(mesh)?;
+                let origin = centre(&mesh.vertices);
+                let (normals, index) = rayon::join(|| PseudoNormals::new(mesh, &origin), || Index::new(origin, triangles(mesh, &origin)));
+                Ok(Self::Mesh { mesh, index, normals })
+            }
+            Reference::Cloud(cloud) => {
+                if cloud.is_empty() {
+                    return Err(EvalError::EmptyReference("the cloud has no points"));
+                }
+                check_positions("reference point", &cloud.positions, &Point3::origin())?;
+                let origin = centre(&cloud.positions);
+                Ok(Self::Cloud(Index::new(origin, cloud.positions.iter().map(|p| p - origin).collect())))
+            }
+        }
     }
-    check_positions("reference point", others, &Point3::origin())?;
-    let (origin, extent) = frame(others);
-    check_positions("point", points, &origin)?;
-    let index = Index::new(origin, extent, others.iter().map(|p| p - origin).collect());
-    Ok(index.map_nearest(points, |nearest, p| (p - index.primitives[nearest]).norm()))
+
+    /// Distance of every point: signed to a mesh, unsigned to a cloud.
+    pub fn distances(&self, points: &[Point3<f64>]) -> Result<Vec<f64>, EvalError> {
+        match self {
+            Self::Mesh { mesh, index, normals } => {
+                check_positions("point", points, &index.origin)?;
+                Ok(index.map_nearest(points, |found, p| {
+                    let (triangle, face) = index.primitive(found.slot);
+                    let (to_point, feature) = triangle.nearest(p);
+                    to_point.norm() * normals.sign(mesh, face, feature, &to_point)
+                }))
+            }
+            Self::Cloud(index) => {
+                check_positions("point", points, &index.origin)?;
+                Ok(index.map_nearest(points, |found, _| found.squared.sqrt()))
+            }
+        }
+    }
+}
+
+/// The triangles of a mesh relative to `origin`.
+pub(crate) fn triangles(mesh: &Mesh, origin: &Point3<f64>) -> Vec<Triangle> {
+    mesh.faces.iter().map(|face| Triangle::new(corners(&mesh.vertices, face, origin))).collect()
 }
 
 /// A mesh has faces, these name existing vertices, and all are at usable positions.
@@ -53,8 +81,8 @@ pub(crate) fn check_positions(what: &'static str, points: &[Point3<f64>], origin
     bad.map_or(Ok(()), |index| Err(EvalError::BadPosition { what, index, position: points[index].into() }))
 }
 
-/// Centre of the box of the points and the largest coordinate relative to it: what f32 has to hold.
-fn frame(points: &[Point3<f64>]) -> (Point3<f64>, f64) {
-    let (min, max) = morton::bounds(points);
-    (nalgebra::center(&min, &max), (max - min).amax() / 2.0)
+/// Centre of the box of the points: what coordinates are taken relative to, so that f32 can hold them.
+pub(crate) fn centre(points: &[Point3<f64>]) -> Point3<f64> {
+    let (min, max) = hilbert::bounds(points);
+    nalgebra::center(&min, &max)
 }

@@ -10,7 +10,7 @@ use scene::Mesh;
 /// each face there (Baerentzen & Aanaes, *Signed distance computation using the angle weighted pseudonormal*, TVCG 2005,
 /// who prove the sign for closed surfaces; on open ones it tells the side of the nearest face). Vertices at the same
 /// position count as one, so that triangle soups keep their sign. Faces without area carry no normal.
-pub(super) struct PseudoNormals {
+pub(crate) struct PseudoNormals {
     faces: Vec<Vector3<f64>>,
     edges: Vec<[Vector3<f64>; 3]>,
     vertices: Vec<Vector3<f64>>,

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 /// The part of a triangle that is nearest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Feature {
+pub(crate) enum Feature {
     Face,
     /// The edge from corner i to corner i + 1.
     Edge(usize),
@@ -13,7 +13,7 @@ pub(super) enum Feature {
 
 /// A triangle, prepared for distances.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Triangle {
+pub(crate) struct Triangle {
     a: Vector3<f64>,
     ab: Vector3<f64>,
     ac: Vector3<f64>,
@@ -70,6 +70,11 @@ impl Triangle {
         }
         let normal = ab.cross(&ac);
         (normal * (normal.dot(&ap) / normal.norm_squared()), Feature::Face)
+    }
+
+    /// Unit normal, to the side from which the corners run counter-clockwise; `None` for corners on one line.
+    pub fn normal(&self) -> Option<Vector3<f64>> {
+        if self.flat { None } else { self.ab.cross(&self.ac).try_normalize(0.0) }
     }
 
     /// Smallest and largest coordinates.
