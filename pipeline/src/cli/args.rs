@@ -260,9 +260,9 @@ pub struct TrainArgs {
 /// Arguments of `sfm eval`.
 #[derive(Debug, Args)]
 pub struct EvalArgs {
-    /// The cloud, PLY.
+    /// The cloud: PLY, XYZ (text), or the vertices of an OBJ, OFF or STL.
     pub cloud: PathBuf,
-    /// What it is compared with: a mesh (PLY, OBJ) or a cloud (PLY).
+    /// What it is compared with: a mesh (PLY, OBJ, OFF, STL) or a cloud (PLY, XYZ).
     #[arg(long, value_name = "FILE")]
     pub reference: PathBuf,
     /// Ground sample distance; the threshold is twice it where none is given.
@@ -277,12 +277,54 @@ pub struct EvalArgs {
     /// Cell of the integrity [default: the threshold].
     #[arg(long, value_name = "METRES")]
     pub grid_m: Option<f64>,
+    /// Further thresholds of the curves of accuracy and completeness, with commas.
+    #[arg(long, value_name = "METRES", value_delimiter = ',')]
+    pub curve_m: Vec<f64>,
+    /// Move the cloud onto the reference first, rigidly (icp) or with a scale (icp-scale).
+    #[arg(long, value_enum)]
+    pub align: Option<Align>,
+    /// Corresponding points that move the cloud before anything else: lines of `x y z X Y Z`, from the cloud to the reference.
+    #[arg(long, value_name = "FILE")]
+    pub correspondences: Option<PathBuf>,
+    /// Leave the scale free where corresponding points are given.
+    #[arg(long, requires = "correspondences")]
+    pub free_scale: bool,
+    /// Measure only within this box, in the frame of the reference.
+    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_delimiter = ',', num_args = 6, allow_hyphen_values = true)]
+    pub bounds: Vec<f64>,
+    /// Measure only within a polygon seen from above: lines of `x y`.
+    #[arg(long, value_name = "FILE")]
+    pub polygon: Option<PathBuf>,
+    /// Write the cloud with its distances, coloured: .ply, or .csv without colours.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Write the figures as CSV: key, value.
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Compare height models with cells of this size (z up): volumes raised and lowered.
+    #[arg(long, value_name = "METRES")]
+    pub dem_cell_m: Option<f64>,
+    /// M3C2 with cylinders of this diameter, normals over three times it; the reference has to be a cloud.
+    #[arg(long, value_name = "METRES")]
+    pub m3c2_m: Option<f64>,
+    /// Error of the registration for the confidence of M3C2.
+    #[arg(long, value_name = "METRES", default_value_t = 0.0, requires = "m3c2_m")]
+    pub registration_m: f64,
     /// Number of threads; the results are the same with any [default: one a processor].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// How a cloud is moved onto its reference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Align {
+    /// Rigidly.
+    Icp,
+    /// With a scale.
+    IcpScale,
 }
 
 /// Arguments of `sfm orient`.

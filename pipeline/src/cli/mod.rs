@@ -2,6 +2,7 @@
 
 mod args;
 mod bundle;
+mod coloured;
 mod dispatch;
 mod eval;
 mod export;

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "evaluate", version: 1, upstream: &["mask", "orient", "densify"], options, inputs, work };
+pub const STAGE: Stage = Stage { name: "evaluate", version: 2, upstream: &["mask", "orient", "densify"], options, inputs, work };
 
 /// The figures.
 const METRICS: &str = "eval/metrics.json";
@@ -68,6 +68,7 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
                 ..EvalOptions::default()
             };
             let metrics = evaluate(&moved_cloud(cloud, moved), &reference, &options)?;
+            warnings.extend(metrics.warnings.iter().map(|w| about(w)));
             merge(&mut figures, serde_json::to_value(metrics)?);
         }
     }
