@@ -40,11 +40,13 @@ impl HeightModel {
     pub fn add(&mut self, points: &[Point3<f64>]) {
         for p in points {
             let [x, y] = [p.x - self.origin[0], p.y - self.origin[1]].map(|d| (d / self.cell_m).floor());
-            if x >= 0.0 && y >= 0.0 && x < self.columns as f64 {
-                if let Some((sum, count)) = self.sums.get_mut(y as usize * self.columns + x as usize) {
-                    *sum += p.z;
-                    *count += 1;
-                }
+            if x >= 0.0
+                && y >= 0.0
+                && x < self.columns as f64
+                && let Some((sum, count)) = self.sums.get_mut(y as usize * self.columns + x as usize)
+            {
+                *sum += p.z;
+                *count += 1;
             }
         }
     }

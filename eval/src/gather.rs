@@ -77,8 +77,11 @@ pub(crate) fn gather(
     })
 }
 
+/// Smallest and largest coordinates.
+type Bounds = (Point3<f64>, Point3<f64>);
+
 /// Number of points and their box.
-fn survey(points: &dyn Points) -> Result<(usize, (Point3<f64>, Point3<f64>)), EvalError> {
+fn survey(points: &dyn Points) -> Result<(usize, Bounds), EvalError> {
     let (mut count, mut all) = (0, None);
     points.visit(&mut |piece| {
         check_positions("point", piece, &Point3::origin()).map_err(|e| match e {

@@ -28,7 +28,7 @@ pub(super) struct Candidate {
 impl Candidate {
     /// +1 where the square between edge `k` and the next one is bright, else -1.
     pub(super) fn side(&self, k: usize) -> f64 {
-        if (k % 2 == 0) == self.first_bright { 1.0 } else { -1.0 }
+        if k.is_multiple_of(2) == self.first_bright { 1.0 } else { -1.0 }
     }
 }
 

@@ -26,6 +26,9 @@ pub(super) struct Grid {
     bright: f64,
 }
 
+/// Column and row of a corner, and its pixel.
+type PlacedCorner = ((i32, i32), Vector2<f64>);
+
 impl Grid {
     /// The patch without stray lines at its border.
     pub(super) fn new(patch: &Patch, candidates: &[Candidate], image: &Raster<f32>) -> Option<Self> {
@@ -138,7 +141,7 @@ impl Grid {
     /// corners are on neither.
     pub(super) fn extend(&mut self, image: &Raster<f32>, along_columns: bool) -> bool {
         let (size, other) = if along_columns { (self.columns, self.rows) } else { (self.rows, self.columns) };
-        let line = |side: i32| -> Option<(f64, Vec<((i32, i32), Vector2<f64>)>)> {
+        let line = |side: i32| -> Option<(f64, Vec<PlacedCorner>)> {
             let mut score = 0.0;
             let mut found = Vec::new();
             for k in 0..other {
