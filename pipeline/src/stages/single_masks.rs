@@ -38,9 +38,9 @@ impl Singles<'_> {
             }
         }
         match self.work.config.mask.strategy {
-            MaskStrategy::Files => self.from_file(image, path, cut),
+            MaskStrategy::Files => self.read_from(image, path, cut),
             MaskStrategy::None => self.whole(image, path),
-            MaskStrategy::Ip | MaskStrategy::Ml | MaskStrategy::IpMl => self.from_image(image, path, decoded, cut),
+            MaskStrategy::Ip | MaskStrategy::Ml | MaskStrategy::IpMl => self.made_from(image, path, decoded, cut),
         }
     }
 
@@ -56,7 +56,7 @@ impl Singles<'_> {
         Ok(Ok(key))
     }
 
-    fn from_file(&self, image: &ImageEntry, path: &str, cut: bool) -> Result<Result<Fingerprint, String>> {
+    fn read_from(&self, image: &ImageEntry, path: &str, cut: bool) -> Result<Result<Fingerprint, String>> {
         let Some(pattern) = &self.work.config.cameras[image.camera].mask else { return Ok(Err("its camera has no masks".to_owned())) };
         let bytes = match std::fs::read(pattern.file(&image.stem)) {
             Ok(bytes) => bytes,
@@ -80,7 +80,7 @@ impl Singles<'_> {
         }
     }
 
-    fn from_image(
+    fn made_from(
         &self,
         image: &ImageEntry,
         path: &str,

@@ -13,7 +13,7 @@ const SQUARE_M: f64 = 0.03;
 fn camera(c: usize) -> Camera {
     let d = c as f64;
     let params = [1350.0 + 10.0 * d, 660.0 - 8.0 * d, 470.0 + 5.0 * d, 0.2, 0.3, -0.1, 0.002, -0.001, 0.001, -0.0008];
-    Camera::new(CameraModel::Brown, 1280, 960, &params).unwrap()
+    Camera::new(CameraModel::Brown, 1280, 960, &params).expect("valid")
 }
 
 fn cam_from_rig(c: usize) -> Rigid3 {
