@@ -224,6 +224,34 @@ fn variables_are_paths_and_calibrations_must_fit() {
     assert!(stderr.contains("ingest") && stderr.contains("another aspect") && !stderr.contains("features"), "{stderr}");
 }
 
+/// A sheet a centimetre above a square of two triangles: a box cuts it, closest points move it onto the square, and figures are written.
+#[test]
+fn eval_cuts_aligns_and_writes() {
+    let dive = Dive::empty();
+    let sheet: Vec<String> =
+        (0..2500).map(|i| format!("{} {} 0.01", 0.02 * f64::from(i % 50) + 0.01, 0.02 * f64::from(i / 50) + 0.01)).collect();
+    dive.write("sheet.xyz", &sheet.join("\n"));
+    dive.write("square.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n");
+    let measure = |more: &[&str]| -> serde_json::Value {
+        let all = [&["eval", "sheet.xyz", "--reference", "square.off", "--threshold-m", "0.02", "--json"], more].concat();
+        serde_json::from_str(&dive.ok(&all)).unwrap()
+    };
+    let near = |value: &serde_json::Value, expected: f64| (value.as_f64().unwrap() - expected).abs() < 1e-9;
+    let whole = measure(&["--out", "coloured.ply", "--csv", "figures.csv"]);
+    assert!(whole["points"] == 2500 && near(&whole["c2m_signed_mean_m"], 0.01) && near(&whole["c2m_mad_m"], 0.0), "{whole:#}");
+    assert!(std::fs::read_to_string(dive.path("figures.csv")).unwrap().contains("\npoints,2500\n"));
+    let (coloured, _) = scene::format::read_ply_cloud(std::fs::read(dive.path("coloured.ply")).unwrap().as_slice()).unwrap();
+    assert_eq!((coloured.positions.len(), coloured.colours.len()), (2500, 2500));
+    assert_eq!(measure(&["--box", "0,0,-1,0.5,1,1"])["points"], 1250);
+    assert!(near(&measure(&["--align", "icp"])["c2m_mean_m"], 0.0));
+    let fails = |more: &[&str]| dive.fails(&[&["eval", "sheet.xyz", "--reference", "square.off", "--threshold-m", "0.02"], more].concat());
+    assert!(fails(&["--box", "0,0,0,1"]).1.contains("for example 0,0,-2,10,5,1"));
+    assert!(fails(&["--box", "1,0,0,0,1,1"]).1.contains("the smallest"));
+    dive.write("none.xyz", "");
+    let (code, message) = dive.fails(&["eval", "none.xyz", "--reference", "square.off", "--threshold-m", "0.02"]);
+    assert!(code == 1 && message.contains("none.xyz") && message.contains("empty"), "{message}");
+}
+
 /// Two images of four points: what comes out must project where they were seen.
 #[test]
 fn bundle_adjusts_a_problem_and_refuses_a_broken_one() {

@@ -290,8 +290,8 @@ pub struct EvalArgs {
     #[arg(long, requires = "correspondences")]
     pub free_scale: bool,
     /// Measure only within this box, in the frame of the reference.
-    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_delimiter = ',', num_args = 6, allow_hyphen_values = true)]
-    pub bounds: Vec<f64>,
+    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = box_of_corners, allow_hyphen_values = true)]
+    pub bounds: Option<[[f64; 3]; 2]>,
     /// Measure only within a polygon seen from above: lines of `x y`.
     #[arg(long, value_name = "FILE")]
     pub polygon: Option<PathBuf>,
@@ -409,6 +409,14 @@ fn image_size(text: &str) -> Result<(u32, u32), String> {
     match sides {
         Some((width, height)) if (64..=8192).contains(&width) && (64..=8192).contains(&height) => Ok((width, height)),
         _ => Err("give width and height from 64 to 8192 pixels, for example 960x600".to_owned()),
+    }
+}
+
+fn box_of_corners(text: &str) -> Result<[[f64; 3]; 2], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+    match numbers.as_deref() {
+        Some(&[x0, y0, z0, x1, y1, z1]) if x0 <= x1 && y0 <= y1 && z0 <= z1 => Ok([[x0, y0, z0], [x1, y1, z1]]),
+        _ => Err("give the smallest x, y and z and then the largest, for example 0,0,-2,10,5,1".to_owned()),
     }
 }
 

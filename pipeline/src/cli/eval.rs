@@ -49,7 +49,7 @@ pub(super) fn eval(args: &EvalArgs) -> Result<()> {
     if let Some(e) = failed {
         return Err(e);
     }
-    let metrics = metrics?;
+    let metrics = metrics.with_context(|| format!("{} against {}", args.cloud.display(), args.reference.display()))?;
     if let Some(out) = out {
         out.finish()?;
     }
@@ -77,16 +77,7 @@ pub(super) fn eval(args: &EvalArgs) -> Result<()> {
 }
 
 fn region(args: &EvalArgs) -> Result<Option<Region>> {
-    let bounds = match args.bounds.as_slice() {
-        &[x0, y0, z0, x1, y1, z1] => {
-            let (low, high) = (Point3::new(x0, y0, z0), Point3::new(x1, y1, z1));
-            if !(0..3).all(|i| low[i] <= high[i]) {
-                bail!("--box: give the smallest coordinates first, then the largest");
-            }
-            Some((low, high))
-        }
-        _ => None,
-    };
+    let bounds = args.bounds.map(|[low, high]| (Point3::from(low), Point3::from(high)));
     let polygon = match &args.polygon {
         Some(path) => {
             let corners = read_numbers::<2>(path)?;
