@@ -78,21 +78,21 @@ fn object_distances(model: &Reconstruction) -> Vec<Option<f64>> {
 
 /// The model as COLMAP can hold it: without shear, and with cameras of one projection centre in place of those behind a port, which fit at the median
 /// distance of what these see. `None` when it can hold it as it is.
-fn for_colmap(model: &Reconstruction) -> Result<Option<Reconstruction>> {
+fn for_colmap(model: &Reconstruction) -> Option<Reconstruction> {
     let has_shear = |camera: &Camera| camera.model() == CameraModel::Brown && camera.params()[BROWN_SHEAR] != 0.0;
     if !model.cameras.iter().any(|camera| has_shear(camera) || camera.port().is_some()) {
-        return Ok(None);
+        return None;
     }
     let distances = object_distances(model);
     let mut model = model.clone();
     for (camera, distance) in model.cameras.iter_mut().zip(distances) {
         let at_its_objects = distance.map_or(*camera, |distance| camera.with_object_distance(distance));
-        *camera = at_its_objects.central().context("no camera without a port comes near one behind it: look at its parameters")?;
+        *camera = at_its_objects.central();
         if has_shear(camera) {
             camera.params_mut()[BROWN_SHEAR] = 0.0;
         }
     }
-    Ok(Some(model))
+    Some(model)
 }
 
 type Writer = fn(&ColmapModel<'_>, &mut dyn Write) -> std::io::Result<()>;
@@ -114,7 +114,7 @@ pub fn save(work: &Work<'_>, model: &Reconstruction, sigmas: &[Option<f64>], fol
 /// # Errors
 /// When COLMAP cannot hold the model.
 pub fn files(model: &Reconstruction, sigmas: &[Option<f64>]) -> Result<Vec<(&'static str, Vec<u8>)>> {
-    let changed = for_colmap(model)?;
+    let changed = for_colmap(model);
     let colmap = ColmapModel::new(changed.as_ref().unwrap_or(model))?;
     let writers: [Writer; 5] = [
         |m, out| m.write_cameras_binary(out),

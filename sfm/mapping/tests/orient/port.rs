@@ -61,7 +61,7 @@ fn the_lens_behind_a_port_is_refined() {
 #[test]
 fn distortion_does_not_take_up_a_port() {
     let made = behind_a_port();
-    let error = error_m(&made, Mapper::Incremental, |camera| camera.central().expect("regular"), false);
+    let error = error_m(&made, Mapper::Incremental, Camera::central, false);
     // The reason for the model: millimetres, at no noise at all.
     assert!(error > 1e-3, "{error}");
 }

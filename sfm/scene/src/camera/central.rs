@@ -33,21 +33,29 @@ impl Camera {
         Self::new(CameraModel::Brown, width, height, camera.params()).ok()
     }
 
-    /// A camera without a port that stands for this one: itself where it has none, else Brown's model fitted over the image at the port's object distance. Distortion takes up what it can of the
-    /// refraction there; elsewhere it is off by up to some pixels. `None` where the lens does not see its whole image.
+    /// A camera without a port that stands for this one: itself where it has none, else Brown's model fitted over the image at the port's
+    /// object distance. Distortion takes up what it can of the refraction there; elsewhere it is off by up to some pixels. Where no
+    /// such model fits, as with lenses that see more than half a sphere in air, it has the principal distance and point alone.
     #[must_use]
-    pub fn central(&self) -> Option<Self> {
-        let Some(port) = self.port() else { return Some(*self) };
+    pub fn central(&self) -> Self {
+        let Some(port) = self.port() else { return *self };
         let (w, h) = (f64::from(self.width()), f64::from(self.height()));
         let mut seen = Vec::with_capacity(GRID * GRID);
         for j in 0..GRID {
             for i in 0..GRID {
                 let pixel = Vector2::new(w * i as f64, h * j as f64) / (GRID - 1) as f64;
-                let uv = self.in_air().unproject(&pixel)?;
-                seen.push((pixel, port.point_at_object_distance(&uv.push(1.0))?));
+                let in_air = self.in_air().unproject(&pixel);
+                seen.extend(in_air.and_then(|uv| Some((pixel, port.point_at_object_distance(&uv.push(1.0))?))));
             }
         }
-        Self::fit_brown(self.width(), self.height(), self.mean_focal(), &seen)
+        Self::fit_brown(self.width(), self.height(), self.mean_focal(), &seen).unwrap_or_else(|| self.without_distortion())
+    }
+
+    /// Brown's model with this camera's principal distance in the water, its principal point, and no distortion.
+    fn without_distortion(&self) -> Self {
+        let [x0, y0] = self.principal_point();
+        let params = [self.mean_focal(), x0, y0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        Self::new(CameraModel::Brown, self.width(), self.height(), &params).unwrap_or_else(|_| self.in_air())
     }
 }
 
@@ -70,13 +78,20 @@ mod tests {
             object_distance_m: 3.5,
         };
         let camera = lens.behind(Some(port)).expect("possible");
-        let central = camera.central().expect("regular");
+        let central = camera.central();
         assert_eq!((central.port(), central.model()), (None, CameraModel::Brown));
         let miss = |x: &Vector3<f64>| (camera.project(x).expect("seen") - central.project(x).expect("seen")).norm();
         let direction = Vector3::new(0.35, 0.2, 1.0).normalize();
         // Three radial terms leave some tenths of a pixel within the image; half the distance moves a point by several.
         assert!(miss(&(3.5 * direction)) < 0.6, "{}", miss(&(3.5 * direction)));
         assert!(miss(&(0.5 * direction)) > 2.0, "{}", miss(&(0.5 * direction)));
-        assert_eq!(lens.central(), Some(lens));
+        assert_eq!(lens.central(), lens);
+        // Corners beyond what the lens images are left out of the fit; one that images nothing there still has a central camera.
+        for k in [-0.4, -2.0] {
+            let narrow = Camera::new(CameraModel::SimpleRadial, 1920, 1200, &[1000.0, 960.0, 600.0, k]).expect("valid");
+            let central = narrow.behind(Some(port)).expect("possible").central();
+            let focal = central.params()[0];
+            assert!(central.port().is_none() && (1000.0..1800.0).contains(&focal), "{k}: {central:?}");
+        }
     }
 }
