@@ -62,6 +62,11 @@ pub const REPORT_KEYS: &[(&str, &str)] = &[
     ("precision.redundancy", "number of observations minus number of unknowns"),
     ("precision.sigma0_image", "standard deviation of the image observations, estimated over given; the estimated one is used"),
     ("precision.sigma0_baselines", "the same of the baselines; null where nothing checks them"),
+    (
+        "precision.baseline_bend",
+        "standard deviations by which the model may be displaced because distances are not linear within what is undetermined; above 0.5 \
+         the stated deviations are too small",
+    ),
     ("precision.sigma0_scale_bars", "the same of the scale bars"),
     (
         "precision.centre_median",

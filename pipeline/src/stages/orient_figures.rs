@@ -156,6 +156,7 @@ fn precision(summary: &OrientSummary, model: &Reconstruction) -> Value {
             "centre_m": p.centre, "rotation_deg": p.rotation_rad.map(f64::to_degrees),
         })), "redundancy": quality.redundancy, "sigma0_image": quality.sigma0_image,
         "sigma0_baselines": quality.sigma0_baselines, "sigma0_scale_bars": quality.sigma0_scale_bars,
+        "baseline_bend": quality.baseline_bend,
         "centre_median": centres.map(|c| c.0), "centre_max": centres.map(|c| c.1),
         "rotation_median_deg": rotations.map(|r| r.0), "rotation_max_deg": rotations.map(|r| r.1), "point_median": points.map(|p| p.0),
     })

@@ -17,6 +17,10 @@ use solve::adjust::{AdjustSummary, CovarianceError};
 /// its removal lowers the sum of squares, as it would by chance once in e^10 times.
 const CLEARLY: f64 = 20.0;
 
+/// Standard deviations by which the bend of the baselines may displace a model before that is told: below, the mean squares of its errors
+/// are at most a quarter larger than stated.
+const MAX_BEND: f64 = 0.5;
+
 /// A finished model.
 pub(crate) struct Done<'a> {
     pub model: Model<'a>,
@@ -97,8 +101,9 @@ fn wrong_length(lengths: &[(LengthId, Option<f64>)]) -> Option<(LengthId, f64)> 
     (worst.1.abs() > CRITICAL && worst.1.powi(2) > second.1.powi(2) + CLEARLY).then_some(worst)
 }
 
-/// What the normalised residuals of the lengths say.
-pub(crate) fn length_notes(input: &MapInput, lengths: &[(LengthId, Option<f64>)], rejected: &[(LengthId, f64)]) -> Vec<String> {
+/// What the normalised residuals of the lengths say, and where they leave the place of a camera open.
+pub(crate) fn length_notes(input: &MapInput, quality: Option<&Quality>, rejected: &[(LengthId, f64)]) -> Vec<String> {
+    let lengths = quality.map_or(&[][..], |q| &q.lengths);
     let name = |id: LengthId| match id {
         LengthId::Baseline(i) => {
             let b = &input.rig.baselines[i];
@@ -122,5 +127,13 @@ pub(crate) fn length_notes(input: &MapInput, lengths: &[(LengthId, Option<f64>)]
         let list = against.join(", ");
         format!("known lengths contradict each other, and which is wrong cannot be told: {list}, normalised residuals in brackets, at most {CRITICAL} by chance")
     });
-    out.chain(undecided).collect()
+    let bent = quality.filter(|q| q.baseline_bend > MAX_BEND).map(|q| {
+        format!(
+            "the distances between cameras hardly tell where some of them are across the line to the others (their bend is {:.1} standard \
+             deviations, at most {MAX_BEND} is harmless): the stated standard deviations are too small; let the cameras see the same points, \
+             or give the mounting of the rig",
+            q.baseline_bend
+        )
+    });
+    out.chain(undecided).chain(bent).collect()
 }

@@ -67,7 +67,7 @@ pub(crate) fn orientation(input: &MapInput, done: Done, mut notes: Vec<String>, 
         }
     }
     let of_lengths = done.quality.as_ref().map_or(&[][..], |q| &q.lengths);
-    notes.extend(length_notes(input, of_lengths, &done.rejected));
+    notes.extend(length_notes(input, done.quality.as_ref().ok(), &done.rejected));
     notes.extend(done.known.ties.notes.iter().cloned());
     notes.splice(0..0, contradiction::note(&done.model, options));
     let left_out_reasons = reasons(&done.model, &done.outcomes);

@@ -38,6 +38,9 @@ pub struct Quality {
     /// Normalised residual v / (sigma sqrt(r)), with the redundancy r, of each length that takes part, a baseline's exposures together;
     /// `None` where nothing checks it.
     pub lengths: Vec<(LengthId, Option<f64>)>,
+    /// By how many of these standard deviations the model may be displaced because distances between cameras are not linear within what
+    /// is left undetermined: the norm of [`Covariance::baseline_bends`]. Above a half they state too little.
+    pub baseline_bend: f64,
 }
 
 /// Standard deviations of a pose.
@@ -111,6 +114,7 @@ pub(crate) fn quality(
         cameras: (0..model.cameras.len()).map(|c| interior_sigma(&problem, c, &found)).collect(),
         points: points(model, &found),
         lengths: of_groups.chain(of_bars).collect(),
+        baseline_bend: found.baseline_bends[..baseline_count].iter().map(|b| b * b).sum::<f64>().sqrt(),
     })
 }
 

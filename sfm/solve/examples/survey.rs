@@ -69,6 +69,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     problem.frames[held].free = false;
     let found = consistency(&problem, &truth, &CovarianceOptions::default())?;
     println!("covariance of {} frames in {:.1} s", problem.frames.len(), start.elapsed().as_secs_f64());
+    let bend = found.covariance.baseline_bends.iter().map(|b| b * b).sum::<f64>().sqrt();
+    println!("the baselines bend by {bend:.3} standard deviations");
     print("all poses", &found.joint);
     print("each pose", &found.single);
     // The world in which the truth agrees with what is held.

@@ -76,7 +76,6 @@ pub struct Consistency {
 /// # Panics
 /// When `truth` has not one pose a frame.
 pub fn consistency(problem: &Problem, truth: &[Rigid3], options: &CovarianceOptions) -> Result<Consistency, CovarianceError> {
-    assert_eq!(truth.len(), problem.frames.len(), "one true pose a frame");
     let mut system = Normal::new(problem, options)?;
     let reduced = system.reduce(system.packed(options)?);
     let errors = errors(problem, truth, &system.layout);
@@ -86,8 +85,22 @@ pub fn consistency(problem: &Problem, truth: &[Rigid3], options: &CovarianceOpti
     Ok(Consistency { covariance: system.collect(problem, &inverse, options), joint, single })
 }
 
+/// [`Consistency::joint`] alone. It needs the memory of [`consistency`], but no inverse: seconds where that takes an hour.
+///
+/// # Errors
+/// [`CovarianceError`].
+///
+/// # Panics
+/// When `truth` has not one pose a frame.
+pub fn joint_consistency(problem: &Problem, truth: &[Rigid3], options: &CovarianceOptions) -> Result<NormalisedError, CovarianceError> {
+    let system = Normal::new(problem, options)?;
+    let reduced = system.reduce(system.packed(options)?);
+    joint(&system.layout, &reduced, &errors(problem, truth, &system.layout)).ok_or(CovarianceError::Singular)
+}
+
 /// The step from each free frame to the truth.
 fn errors(problem: &Problem, truth: &[Rigid3], layout: &Layout) -> Vec<Vector6<f64>> {
+    assert_eq!(truth.len(), problem.frames.len(), "one true pose a frame");
     let held = problem.frames.iter().position(|f| !f.free);
     let moved = held.map_or(Rigid3::identity(), |h| truth[h].inverse() * problem.frames[h].pose);
     let frames = layout.owners.iter().map_while(|o| if let Owner::Frame(i) = o { Some(*i as usize) } else { None });

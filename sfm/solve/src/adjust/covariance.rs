@@ -3,7 +3,7 @@
 use super::error::AdjustError;
 use super::inverse::Inverse;
 use super::layout::{Layout, Owner};
-use super::lengths::KeptNormal;
+use super::lengths::{KeptNormal, mean_bend};
 use super::linearise::Linearised;
 use super::options::Loss;
 use super::pattern::{PACKED_UNKNOWNS, Pattern};
@@ -12,6 +12,7 @@ use super::schur::Reduced;
 use super::state::State;
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use rayon::prelude::*;
+use scene::camera::MAX_CAMERA_PARAMS;
 
 /// The covariance of the parameters at an optimum, and what each observation of few contributes to the redundancy.
 ///
@@ -34,6 +35,11 @@ pub struct Covariance {
     pub redundancy: Vec<f64>,
     /// Number of scalar residuals minus the number of unknowns.
     pub total_redundancy: f64,
+    /// By how much the residual of each baseline changes on average, to second order, when its ends move with this covariance. The norm of
+    /// several is the number of standard deviations by which the optimum may be displaced (cf. the intrinsic curvature of Bates & Watts,
+    /// *J. Royal Statistical Society* B 42, 1980). Well below 1 the covariance holds; above, errors are larger than it says: where a
+    /// camera is across the line to another, a distance tells by its bend only, and that is the same on either side of the line.
+    pub baseline_bends: Vec<f64>,
 }
 
 /// What a covariance is computed with.
@@ -183,6 +189,7 @@ impl Normal {
             points: vec![None; problem.points.len()],
             redundancy: Vec::new(),
             total_redundancy: 0.0,
+            baseline_bends: Vec::new(),
         };
         for (a, &owner) in layout.owners.iter().enumerate() {
             let square = inverse.between(layout, a, a).unwrap_or_default();
@@ -202,18 +209,16 @@ impl Normal {
             covariance.points[layout.slots[s].point as usize] = Some(matrix);
         }
         let observations = layout.obs.len() + layout.kept_observations.len();
+        let variance = |blocks: &[u32], gradients: &[[f64; MAX_CAMERA_PARAMS]]| {
+            let parts = || blocks.iter().map(|&a| a as usize).zip(gradients).map(|(a, u)| (a, &u[..layout.dim(a)]));
+            parts().flat_map(|u| parts().map(move |v| inverse.product(u, v))).sum::<f64>()
+        };
         let mut rows = 0;
         kept.visit_rows(problem, layout, state, &options.loss, |blocks, gradients| {
             rows += 1;
-            let mut leverage = 0.0;
-            for (&a, u) in blocks.iter().zip(gradients) {
-                for (&b, v) in blocks.iter().zip(gradients) {
-                    let (a, b) = (a as usize, b as usize);
-                    leverage += inverse.product((a, &u[..layout.dim(a)]), (b, &v[..layout.dim(b)]));
-                }
-            }
-            covariance.redundancy.push(1.0 - leverage);
+            covariance.redundancy.push(1.0 - variance(blocks, gradients));
         });
+        covariance.baseline_bends = problem.baselines.iter().map(|b| mean_bend(layout, state, b, variance)).collect();
         // Observations of kept points come last, and are image observations.
         covariance.redundancy.truncate(rows - 2 * layout.kept_observations.len());
         let unknowns = layout.unknowns() + 3 * free.len();

@@ -4,8 +4,8 @@
 
 use super::layout::{Layout, NONE, Obs, Owner};
 use super::linearise::{ObservationJacobian, linearise_observation, robust_weight};
-use super::problem::{PosePrior, Problem};
-use super::sensors::{control_point_rows, direction_rows, heading_row, position_rows};
+use super::problem::{Baseline, PosePrior, Problem};
+use super::sensors::{across, control_point_rows, direction_rows, heading_row, position_rows};
 use super::state::State;
 use super::summary::LengthResidual;
 use crate::lie::{so3_left_jacobian_inverse, so3_log};
@@ -247,14 +247,19 @@ fn centre_in_world(state: &State, (frame, sensor): (u32, u32)) -> Vector3<f64> {
 }
 
 /// r = (|c_a - c_b| - length) / sigma. Its gradient is zero where the centres coincide, where the distance has none.
+fn baseline_row(layout: &Layout, state: &State, b: &Baseline) -> Row {
+    let difference = centre_in_world(state, b.a) - centre_in_world(state, b.b);
+    let distance = difference.norm();
+    let n = if distance > 0.0 { difference / (distance * b.sigma) } else { Vector3::zeros() };
+    displacement_row(layout, state, b, (distance - b.length) / b.sigma, &n)
+}
+
+/// A residual whose gradient is that of n . (c_a - c_b) for a vector n of the world.
 ///
 /// With c_rig = -R_s^T t_s and c = R^T (c_rig - t), a step (w, d) of the frame moves c by R^T (u x w - d), u = R c, and one
 /// of the sensor moves it by R^T R_s^T (w x t_s - d).
-fn baseline_row(layout: &Layout, state: &State, b: &super::Baseline) -> Row {
-    let difference = centre_in_world(state, b.a) - centre_in_world(state, b.b);
-    let distance = difference.norm();
-    let mut row = Row::new((distance - b.length) / b.sigma);
-    let n = if distance > 0.0 { difference / (distance * b.sigma) } else { Vector3::zeros() };
+fn displacement_row(layout: &Layout, state: &State, b: &Baseline, residual: f64, n: &Vector3<f64>) -> Row {
+    let mut row = Row::new(residual);
     for (sign, (frame, sensor)) in [(1.0, b.a), (-1.0, b.b)] {
         let (f, s) = (&state.frames[frame as usize], &state.sensors[sensor as usize]);
         let n_in_rig = f.rotation * (sign * n);
@@ -267,6 +272,24 @@ fn baseline_row(layout: &Layout, state: &State, b: &super::Baseline) -> Row {
         row.add(layout.sensor_block[sensor as usize], &pose_gradient(&s.translation.cross(&n_in_cam), &-n_in_cam));
     }
     row
+}
+
+/// What a baseline's residual changes by on average, to second order, when its ends move with their covariance: the variance of c_a - c_b
+/// across the line between them over 2 |c_a - c_b| sigma. `variance` gives that of a linear function, from its blocks and gradients.
+pub(super) fn mean_bend(
+    layout: &Layout,
+    state: &State,
+    b: &Baseline,
+    variance: impl Fn(&[u32], &[[f64; MAX_CAMERA_PARAMS]]) -> f64,
+) -> f64 {
+    let difference = centre_in_world(state, b.a) - centre_in_world(state, b.b);
+    let distance = difference.norm();
+    let Some(along) = difference.try_normalize(0.0) else { return f64::INFINITY };
+    let of = |n: Vector3<f64>| {
+        let row = displacement_row(layout, state, b, 0.0, &n);
+        variance(&row.blocks[..row.count], &row.gradients[..row.count])
+    };
+    across(&along).into_iter().map(of).sum::<f64>() / (2.0 * distance * b.sigma)
 }
 
 fn scale_bar_row(layout: &Layout, state: &State, b: &super::ScaleBar) -> Row {

@@ -137,24 +137,23 @@ fn minimise(problem: &Problem, options: &AdjustOptions, layout: &Layout, state: 
             outcome.termination = Termination::ParameterTolerance;
             break;
         }
-        let small_change = decrease.abs() <= options.function_tolerance * outcome.final_cost;
-        if accepted {
-            std::mem::swap(state, &mut candidate);
-            outcome.final_cost = new_cost;
-            outcome.steps_taken += 1;
-            region.accept(if unseen { 1.0 } else { ratio });
-        } else {
+        if !accepted {
+            // However little it would have changed: a shorter step may gain more.
             region.reject();
+            continue;
         }
+        let small_change = decrease <= options.function_tolerance * outcome.final_cost;
+        std::mem::swap(state, &mut candidate);
+        outcome.final_cost = new_cost;
+        outcome.steps_taken += 1;
         if small_change && !unseen {
             outcome.termination = Termination::FunctionTolerance;
             break;
         }
-        if accepted {
-            linear.update(layout, state, loss, parallel);
-            kept.update(problem, layout, state, loss);
-            fresh = true;
-        }
+        region.accept(if unseen { 1.0 } else { ratio });
+        linear.update(layout, state, loss, parallel);
+        kept.update(problem, layout, state, loss);
+        fresh = true;
     }
     Ok(outcome)
 }

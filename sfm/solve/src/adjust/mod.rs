@@ -30,7 +30,7 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
-pub use consistency::{Consistency, NormalisedError, consistency};
+pub use consistency::{Consistency, NormalisedError, consistency, joint_consistency};
 pub use covariance::{Covariance, CovarianceError, CovarianceOptions, covariance};
 pub use error::AdjustError;
 pub use lm::adjust;

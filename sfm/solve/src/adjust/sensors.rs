@@ -66,7 +66,7 @@ pub(super) fn control_point_rows(layout: &Layout, state: &State, o: &ControlPoin
 }
 
 /// Two unit vectors at right angles to a unit vector and to each other.
-fn across(v: &Vector3<f64>) -> [Vector3<f64>; 2] {
+pub(super) fn across(v: &Vector3<f64>) -> [Vector3<f64>; 2] {
     // The axis that it is furthest from.
     let a = v.cross(&Vector3::ith(v.iamin(), 1.0)).normalize();
     [a, v.cross(&a)]

@@ -126,9 +126,9 @@ fn error(found: &Rigid3, truth: &Rigid3) -> Vector6<f64> {
     Vector6::new(w.x, w.y, w.z, d.x, d.y, d.z)
 }
 
-/// Normalised squared errors of the pose of one frame and of the position of one point, summed over many seeds.
-fn small_surveys(sensors: usize, rigid: bool, seeds: u64) -> (f64, f64) {
-    let (mut of_frame, mut of_point) = (0.0, 0.0);
+/// Normalised squared errors of all frames of small surveys, and of the position of one point of each.
+fn small_surveys(sensors: usize, rigid: bool, seeds: u64) -> [NormalisedError; 2] {
+    let (mut of_frames, mut of_point) = (Vec::new(), 0.0);
     for seed in 0..seeds {
         let options = Options { frames: 8, sensors, points: 60, track: 5, noise_px: 0.7, seed: 100 + seed, ..Options::default() };
         let mut truth = truth(&options);
@@ -148,24 +148,27 @@ fn small_surveys(sensors: usize, rigid: bool, seeds: u64) -> (f64, f64) {
         }
         let mut problem = truth.clone();
         adjust(&mut problem, &AdjustOptions { function_tolerance: 1e-12, ..AdjustOptions::default() }).expect("valid");
-        let found = covariance(&problem, &CovarianceOptions::default()).expect("determined");
-        let e = error(&problem.frames[5].pose, &truth.frames[5].pose);
-        of_frame += e.dot(&(found.frames[5].expect("free").try_inverse().expect("positive") * e));
+        let poses: Vec<Rigid3> = truth.frames.iter().map(|f| f.pose).collect();
+        let found = consistency(&problem, &poses, &CovarianceOptions::default()).expect("determined");
+        assert_eq!(joint_consistency(&problem, &poses, &CovarianceOptions::default()).as_ref(), Ok(&found.joint));
+        of_frames.push(found.joint);
         let e = problem.points[30].xyz - truth.points[30].xyz;
-        of_point += e.dot(&(found.points[30].expect("free").try_inverse().expect("positive") * e));
+        of_point += e.dot(&(found.covariance.points[30].expect("free").try_inverse().expect("positive") * e));
     }
-    (of_frame, of_point)
+    let degrees = 3.0 * seeds as f64;
+    [NormalisedError::sum(&of_frames), NormalisedError::new(of_point, degrees, 2.0 * degrees)]
 }
 
 #[test]
 fn errors_are_as_large_as_the_covariance_says() {
-    // Sums of chi-square variables with 6 and 3 degrees of freedom a seed: the normal approximation's 95 % band.
-    let band = |degrees: f64| (degrees - 1.96 * (2.0 * degrees).sqrt())..(degrees + 1.96 * (2.0 * degrees).sqrt());
     for (sensors, rigid) in [(1, false), (2, true)] {
-        let seeds = 100;
-        let (of_frame, of_point) = small_surveys(sensors, rigid, seeds);
-        assert!(band(6.0 * seeds as f64).contains(&of_frame), "rigid {rigid}: {}", of_frame / seeds as f64);
-        assert!(band(3.0 * seeds as f64).contains(&of_point), "rigid {rigid}: {}", of_point / seeds as f64);
+        let [of_frames, of_point] = small_surveys(sensors, rigid, 100);
+        assert!(of_frames.is_in_band(), "rigid {rigid}: {of_frames:?}");
+        assert!(of_point.is_in_band(), "rigid {rigid}: {of_point:?}");
+        // The band of 4,200 degrees of freedom is 4 % wide: variances that are a tenth off would show.
+        for factor in [0.9, 1.1] {
+            assert!(!NormalisedError { value: factor * of_frames.value, ..of_frames }.is_in_band(), "rigid {rigid}: {of_frames:?}");
+        }
     }
 }
 
@@ -228,6 +231,24 @@ fn what_consistency_and_covariance_say_is_the_same() {
     assert!((found.joint.value / expected - 1.0).abs() < 1e-3, "{} {expected}", found.joint.value);
     let too_little = CovarianceOptions { max_bytes: 1000, ..options };
     assert!(matches!(covariance(&problem, &too_little), Err(CovarianceError::TooLarge { allowed: 1000, .. })));
+}
+
+/// Frames on a line whose places are known to s along each axis: each of their distances bends by s^2 / (length sigma) on average.
+#[test]
+fn baselines_bend_across_what_is_undetermined() {
+    let place = |f: u32| Rigid3::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::new(-0.4 * f64::from(f), 0.1, 0.0));
+    let prior = |pose| PosePrior { pose, sigma_rotation_rad: 1e-3, sigma_translation: 0.02 };
+    let mut problem = Problem { sensors: vec![PoseBlock::fixed(Rigid3::identity())], ..Problem::default() };
+    problem.frames = (0..10).map(|f| PoseBlock { free: f > 0, prior: Some(prior(place(f))), ..PoseBlock::fixed(place(f)) }).collect();
+    problem.baselines = (1..10).map(|f| Baseline { a: (0, 0), b: (f, 0), length: 0.4 * f64::from(f), sigma: 0.001 }).collect();
+    let found = covariance(&problem, &CovarianceOptions::default()).expect("determined");
+    for (f, bend) in (1..10).zip(&found.baseline_bends) {
+        let expected = 0.02_f64.powi(2) / (0.4 * f64::from(f) * 0.001);
+        // Turns about the origin move the places by less than a hundredth of 0.02 m, 1e-3 rad times the 0.1 m beside the line.
+        assert!((bend / expected - 1.0).abs() < 1e-2, "{bend} {expected}");
+    }
+    // Along the line the distances themselves tell the places, of which the bend takes no note.
+    assert!(found.frames[1].expect("free")[(3, 3)] < 1.01e-6);
 }
 
 #[test]
