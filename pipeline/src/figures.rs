@@ -39,6 +39,7 @@ pub fn report(config: &Config, done: &BTreeMap<&'static str, Stamp>) -> Value {
         "precision": figure("orient", "precision"),
         "length_error": figure("orient", "length_error"),
         "baselines": figure("orient", "baselines"),
+        "rig_poses": figure("orient", "rig_poses"),
         "scale_bars": figure("orient", "scale_bars"),
         "world": figure("orient", "world"),
         "control_points": figure("orient", "control_points"),

@@ -91,6 +91,10 @@ pub const REPORT_KEYS: &[(&str, &str)] = &[
         "residual of all exposures over its standard deviation: above 3.3 once in 1,000 times by chance; null where nothing checks it",
     ),
     ("baselines[].rejected", "whether it contradicts the other lengths and was taken out"),
+    ("rig_poses[].camera", "a camera whose given pose in the rig was refined"),
+    ("rig_poses[].turned_deg", "angle between the given and the found orientation, degrees"),
+    ("rig_poses[].moved_m", "distance between the given and the found projection centre, metres"),
+    ("rig_poses[].normalised_residual", "the largest of the six residuals over its given standard deviation"),
     ("scale_bars[].name", "name of a known length in the scene"),
     ("scale_bars[].given_m", "the given length, metres"),
     (

@@ -33,7 +33,7 @@ pub(super) fn figures(
     json!({
         "oriented": oriented, "points": model.points.len(), "observations": model.observation_count(), "reprojection_rms_px": rms,
         "reprojection_mean_px": model.mean_point_error(), "scale": scale, "cameras": cameras(list, starts, summary, model),
-        "baselines": baselines(list, summary), "scale_bars": scale_bars(config, summary, told), "models": models, "note": note,
+        "baselines": baselines(list, summary), "rig_poses": rig_poses(list, summary), "scale_bars": scale_bars(config, summary, told), "models": models, "note": note,
         "length_error": length_error(summary), "precision": precision(summary, model), "world": world(summary),
         "control_points": control_points(config, summary, told),
         "mapper": {
@@ -90,6 +90,16 @@ fn baselines(list: &ImageList, summary: &OrientSummary) -> Vec<Value> {
         })
     };
     summary.baselines.iter().map(baseline).collect()
+}
+
+fn rig_poses(list: &ImageList, summary: &OrientSummary) -> Vec<Value> {
+    let pose = |r: &mapping::RigPoseReport| {
+        json!({
+            "camera": list.cameras[r.camera.index()].name, "turned_deg": r.turned_rad.to_degrees(), "moved_m": r.moved_m,
+            "normalised_residual": r.normalised_residual,
+        })
+    };
+    summary.rig_poses.iter().map(pose).collect()
 }
 
 fn scale_bars(config: &Config, summary: &OrientSummary, told: &Told) -> Vec<Value> {

@@ -89,6 +89,9 @@ fn sections(figures: &Value) -> Vec<Section> {
         let between = format!("{} to {}", text(&b["between"][0]), text(&b["between"][1]));
         vec![between, number(&b["given_m"], 4), number(&b["found_m"], 4), number(&b["sigma_m"], 4), number(&b["test_value"], 1), role(b)]
     });
+    let rig = rows(&figures["rig_poses"], |r| {
+        vec![text(&r["camera"]), number(&r["turned_deg"], 4), number(&r["moved_m"], 5), number(&r["normalised_residual"], 1)]
+    });
     let bars = rows(&figures["scale_bars"], |b| {
         let (given, found) = (number(&b["given_m"], 4), number(&b["found_m"], 4));
         vec![text(&b["name"]), given, found, number(&b["error_m"], 5), number(&b["normalised_residual"], 1), role(b)]
@@ -135,6 +138,7 @@ fn sections(figures: &Value) -> Vec<Section> {
     let sections = [
         section("Cameras", "Lengths in pixels.", &["camera", "images", "model", "interior orientation", "start"], cameras),
         section("Baselines", normalised, &["between", "given, m", "found, m", "sigma, m", "normalised residual", "role"], baselines),
+        section("Rig", normalised, &["camera", "turned, degrees", "moved, m", "normalised residual"], rig),
         section("Known lengths", normalised, &["length", "given, m", "found, m", "error, m", "normalised residual", "role"], bars),
         section("Control points", normalised, &["point", "east, m", "north, m", "up, m", "normalised residual", "role"], points),
         section(

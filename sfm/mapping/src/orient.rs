@@ -15,6 +15,7 @@ use crate::model::Model;
 use crate::options::OrientOptions;
 use crate::register::Registration;
 use crate::rig::{solve_rig, with_rig};
+use crate::rig_report::{report_rig, rig_notes};
 use crate::summary::{LeftOut, OrientSummary, Orientation};
 use crate::world_report::report_world;
 use scene::{Observation, Point, Reconstruction, Rigid3, Scale};
@@ -68,6 +69,8 @@ pub(crate) fn orientation(input: &MapInput, done: Done, mut notes: Vec<String>, 
     }
     let of_lengths = done.quality.as_ref().map_or(&[][..], |q| &q.lengths);
     notes.extend(length_notes(input, done.quality.as_ref().ok(), &done.rejected));
+    let rig_poses = report_rig(&done.model, done.scale);
+    notes.extend(rig_notes(input, &rig_poses));
     notes.extend(done.known.ties.notes.iter().cloned());
     notes.splice(0..0, contradiction::note(&done.model, options));
     let left_out_reasons = reasons(&done.model, &done.outcomes);
@@ -78,7 +81,10 @@ pub(crate) fn orientation(input: &MapInput, done: Done, mut notes: Vec<String>, 
     let world = report_world(&done.model, &done.known.ties);
     let models = vec![reconstruction(&done.model, done.scale)];
     let Done { adjustment, quality, rejected, made, .. } = done;
-    Orientation { models, summary: OrientSummary { adjustment, made, left_out, baselines, scale_bars, world, quality, rejected, notes } }
+    Orientation {
+        models,
+        summary: OrientSummary { adjustment, made, left_out, baselines, rig_poses, scale_bars, world, quality, rejected, notes },
+    }
 }
 
 /// How the last try of each image's frame went.

@@ -3,6 +3,7 @@
 use crate::attempt::Made;
 use crate::lengths::LengthId;
 use crate::quality::Quality;
+use crate::rig_report::RigPoseReport;
 use crate::world_report::WorldReport;
 use scene::{CameraId, ImageId, Reconstruction};
 use solve::adjust::{AdjustSummary, CovarianceError};
@@ -27,6 +28,8 @@ pub struct OrientSummary {
     pub left_out: Vec<LeftOut>,
     /// Known baselines and what was found; empty where the first model is not metric.
     pub baselines: Vec<BaselineReport>,
+    /// Given poses in the rig that were refined, and what was found; empty where the first model is not metric.
+    pub rig_poses: Vec<RigPoseReport>,
     /// Known lengths in the scene and what was found.
     pub scale_bars: Vec<ScaleBarReport>,
     /// What instruments and control points say of the first model; `None` where it is not tied to the world.

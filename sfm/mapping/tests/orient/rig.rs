@@ -1,7 +1,7 @@
 //! Cameras on a rig.
 
 use crate::exact::adjusted_truth;
-use crate::support::{assert_near_optimum, baseline, made, noisy, oriented, rig_poses, true_baseline};
+use crate::support::{assert_near_optimum, baseline, complete, made, noisy, oriented, rig_poses, true_baseline};
 use mapping::{MapInput, OrientOptions, RigInput, RigMode, orient};
 use scene::{CameraId, Scale};
 use synthetic::Alignment;
@@ -44,6 +44,18 @@ fn a_rig_given_with_a_deviation_is_refined() {
     // The images see the rotation far better than half a degree; the scale stays the prior's.
     assert!(found.rotation.angle_to(&truth.rotation) < 0.1 * rotation);
     assert!((found.translation.norm() - truth.translation.norm()).abs() < translation);
+    // The images see half a degree, one standard deviation, and leave the place along the baseline.
+    let [report] = out.summary.rig_poses[..] else { panic!("{:?}", out.summary.rig_poses) };
+    assert_eq!(report.camera, CameraId(1));
+    assert!((report.turned_rad / rotation - 1.0).abs() < 0.1, "{report:?}");
+    assert!((report.normalised_residual - 1.0).abs() < 0.5 && out.summary.notes.is_empty(), "{report:?} {:?}", out.summary.notes);
+    // The same with a tenth of the standard deviations is a contradiction.
+    pose.sigma = Some((0.1 * rotation, 0.1 * translation));
+    input.rig.poses[1] = Some(pose);
+    let out = complete(&input);
+    let [report] = out.summary.rig_poses[..] else { panic!("{:?}", out.summary.rig_poses) };
+    assert!(report.normalised_residual > 5.0, "{report:?}");
+    assert!(out.summary.notes.iter().any(|n| n.contains("contradict the given pose of camera in the rig")), "{:?}", out.summary.notes);
 }
 
 #[test]
