@@ -8,7 +8,7 @@ use crate::store::{Fingerprint, Warning};
 use anyhow::{Context, Result};
 use dense::{
     DepthMap, DepthOptions, FusionOptions, FusionSummary, Quality, View, ViewSelectionOptions, depth_range, depth_seeds,
-    estimate_depth_from_seeds, fuse, ground_sample_distance, median_distance, select_views,
+    estimate_depth_from_seeds, fuse, ground_sample_distance, select_views,
 };
 use rayon::prelude::*;
 use scene::format::write_ply_cloud;
@@ -18,7 +18,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "densify", version: 1, upstream: &["ingest", "mask", "orient"], options, inputs: no_inputs, work };
+pub const STAGE: Stage = Stage { name: "densify", version: 2, upstream: &["ingest", "mask", "orient"], options, inputs: no_inputs, work };
 
 /// The dense cloud.
 pub const CLOUD: &str = "dense/cloud.ply";
@@ -163,11 +163,7 @@ impl Scene<'_> {
         let full = imaging::decode_rgb(&self.list.bytes(self.work, entry)?).with_context(|| entry.name.clone())?;
         let rgb = imaging::resize_area_rgb(&full, w, h);
         let mask = mask::load(self.work, self.list, entry)?.map(|mask| imaging::resize_nearest(&mask, w, h));
-        // Behind a port the image is brought to one projection centre, exactly at the distance of what it shows.
-        let camera = camera.resized(width, height)?;
-        let distance = camera.port().and_then(|_| median_distance(self.model, image));
-        let camera = distance.map_or(camera, |distance| camera.with_object_distance(distance));
-        Ok(View { image, camera, cam_from_world, rgb, mask })
+        Ok(View { image, camera: camera.resized(width, height)?, cam_from_world, rgb, mask })
     }
 }
 

@@ -1,16 +1,17 @@
 //! The stored form of a depth map.
 //!
-//! Little-endian. Header of 124 bytes: `SFMDEPTH`; version, image, width, height, number of neighbours, number of known pixels (u32 each); the
-//! pinhole's fx, fy, cx, cy; the rotation cam_from_world as quaternion i, j, k, w; the translation (f64 each). Then the neighbours (u32 each); one
+//! Little-endian. Header of 128 bytes: `SFMDEPTH`; version, image, width, height, number of neighbours, number of known pixels, number of ray
+//! offsets (u32 each); the pinhole's fx, fy, cx, cy; the rotation cam_from_world as quaternion i, j, k, w; the translation (f64 each). Then the
+//! neighbours (u32 each); the ray offsets behind a port, by rows (two f32 each); one
 //! bit a pixel that says whether its depth is known, row after row, lowest bit first; and for the known pixels in that order all depths
 //! (f32), all normals (two i16, octahedral), all confidences (u8, 255 = 1), all colours (3 u8).
 
-use crate::{DenseError, DepthMap};
+use crate::{DenseError, DepthMap, RayOffsets};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use scene::{Camera, CameraModel, ImageId, Raster, Rigid3};
 
 const MAGIC: &[u8; 8] = b"SFMDEPTH";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Bytes of one known pixel.
 const PIXEL: usize = 4 + 4 + 1 + 3;
 
@@ -19,9 +20,12 @@ impl DepthMap {
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let known: Vec<usize> = (0..self.depth.data().len()).filter(|&i| self.depth.data()[i] > 0.0).collect();
-        let mut out = Vec::with_capacity(124 + 4 * self.neighbours.len() + self.depth.data().len() / 8 + 1 + known.len() * PIXEL);
+        let nodes = self.offsets.as_ref().map_or(&[][..], RayOffsets::nodes);
+        let mut out =
+            Vec::with_capacity(128 + 4 * self.neighbours.len() + 8 * nodes.len() + self.depth.data().len() / 8 + 1 + known.len() * PIXEL);
         out.extend(MAGIC);
-        for value in [VERSION, self.image.0, self.camera.width(), self.camera.height(), self.neighbours.len() as u32, known.len() as u32] {
+        let counts = [self.neighbours.len(), known.len(), nodes.len()].map(|n| n as u32);
+        for value in [VERSION, self.image.0, self.camera.width(), self.camera.height()].into_iter().chain(counts) {
             out.extend(value.to_le_bytes());
         }
         let (q, t) = (self.cam_from_world.rotation.coords, self.cam_from_world.translation);
@@ -29,6 +33,7 @@ impl DepthMap {
             out.extend(value.to_le_bytes());
         }
         out.extend(self.neighbours.iter().flat_map(|n| n.0.to_le_bytes()));
+        out.extend(nodes.iter().flatten().flat_map(|v| v.to_le_bytes()));
         let first_bit = out.len();
         out.resize(first_bit + self.depth.data().len().div_ceil(8), 0);
         for &i in &known {
@@ -55,7 +60,7 @@ impl DepthMap {
         }
         let image = ImageId(rest.u32()?);
         let (width, height) = (rest.u32()?, rest.u32()?);
-        let (neighbour_count, known) = (rest.u32()? as usize, rest.u32()? as usize);
+        let [neighbour_count, known, node_count] = [rest.u32()? as usize, rest.u32()? as usize, rest.u32()? as usize];
         let mut values = [0.0; 11];
         for value in &mut values {
             *value = f64::from_le_bytes(rest.array()?);
@@ -70,6 +75,14 @@ impl DepthMap {
         }
         let neighbours =
             rest.take(neighbour_count.saturating_mul(4))?.as_chunks::<4>().0.iter().map(|&b| ImageId(u32::from_le_bytes(b))).collect();
+        let nodes = rest.take(node_count.saturating_mul(8))?.as_chunks::<8>().0.iter();
+        let node = |&[a, b, c, d, e, f, g, h]: &[u8; 8]| [f32::from_le_bytes([a, b, c, d]), f32::from_le_bytes([e, f, g, h])];
+        let nodes: Vec<[f32; 2]> = nodes.map(node).collect();
+        let offsets = if nodes.is_empty() {
+            None
+        } else {
+            Some(RayOffsets::from_nodes(&camera, nodes).ok_or(DenseError::BadBytes("impossible ray offsets"))?)
+        };
         let pixels = (width as usize).checked_mul(height as usize).ok_or(DenseError::BadBytes("impossible size"))?;
         let bits = rest.take(pixels.div_ceil(8))?;
         let (depths, normals) = (rest.take(known.saturating_mul(4))?, rest.take(known.saturating_mul(4))?);
@@ -83,6 +96,7 @@ impl DepthMap {
             camera,
             // Unchecked keeps the bits of what was stored; the norm was checked above.
             cam_from_world: Rigid3::new(UnitQuaternion::new_unchecked(rotation), translation),
+            offsets,
             neighbours,
             depth: Raster::filled(w, h, 0.0),
             normal: Raster::filled(w, h, [0.0; 3]),
@@ -178,10 +192,13 @@ mod tests {
 
     fn map() -> DepthMap {
         let (w, h) = (13, 7);
+        let camera = Camera::new(CameraModel::Pinhole, 13, 7, &[10.0, 11.0, 6.5, 3.5]).expect("valid");
         let mut map = DepthMap {
             image: ImageId(5),
-            camera: Camera::new(CameraModel::Pinhole, 13, 7, &[10.0, 11.0, 6.5, 3.5]).expect("valid"),
+            camera,
             cam_from_world: Rigid3::new(UnitQuaternion::from_euler_angles(0.1, -0.7, 0.3), Vector3::new(1.0, -2.0, 0.3)),
+            // Nodes at the pixels 0, 8, 16 of two rows, 8 apart.
+            offsets: RayOffsets::from_nodes(&camera, (0..6).map(|i| [0.01 * i as f32, -0.003]).collect()),
             neighbours: vec![ImageId(9), ImageId(2)],
             depth: Raster::filled(w, h, 0.0),
             normal: Raster::filled(w, h, [0.0; 3]),
@@ -201,6 +218,7 @@ mod tests {
     #[test]
     fn stored_and_read_is_the_same() {
         let map = map();
+        assert!(map.offsets.is_some());
         assert_eq!(DepthMap::from_bytes(&map.to_bytes()).expect("whole"), map);
     }
 

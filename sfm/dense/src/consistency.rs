@@ -1,7 +1,6 @@
 //! Whether depth maps agree about a point.
 
 use crate::DepthMap;
-use crate::depth_map::ray;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Tolerances of the agreement, see [`crate::FusionOptions`].
@@ -61,12 +60,6 @@ impl<'a> PosedMap<'a> {
         self.rotation.tr_mul(&Vector3::from(n))
     }
 
-    /// Pixel coordinates of a point in the camera frame in front of the camera.
-    pub fn project(&self, x_in_cam: &Vector3<f64>) -> Vector2<f64> {
-        let p = self.map.camera.params();
-        Vector2::new(p[0] * x_in_cam.x / x_in_cam.z + p[2], p[1] * x_in_cam.y / x_in_cam.z + p[3])
-    }
-
     /// What this map says about the point `x_in_world` with the unit normal `normal`, that `reference` has at `reference_px`.
     pub fn opinion(
         &self,
@@ -80,7 +73,7 @@ impl<'a> PosedMap<'a> {
         if x.z <= 0.0 {
             return Opinion::None;
         }
-        let p = self.project(&x);
+        let p = self.map.project(&x);
         let Some(&depth) = self.map.depth.at_point(p.x, p.y) else { return Opinion::None };
         if depth <= 0.0 {
             return Opinion::None;
@@ -90,21 +83,22 @@ impl<'a> PosedMap<'a> {
         // The map's plane, continued from the pixel's centre to the point's exact place.
         let camera = &self.map.camera;
         let n = Vector3::from(self.map.normal.data()[pixel].map(f64::from));
-        let centre = ray(camera, px as f64 + 0.5, py as f64 + 0.5) * f64::from(depth);
-        let direction = x / x.z;
+        let centre = self.map.along_ray(&Vector2::new(px as f64 + 0.5, py as f64 + 0.5), f64::from(depth));
+        let offset = self.map.offset(&p);
+        let direction = (x - offset) / x.z;
         let facing = n.dot(&direction);
-        let z = if facing < -1e-3 { n.dot(&centre) / facing } else { f64::from(depth) };
+        let z = if facing < -1e-3 { n.dot(&(centre - offset)) / facing } else { f64::from(depth) };
         if x.z < z * (1.0 - 3.0 * tolerance.relative_depth) {
             return Opinion::Contradiction;
         }
         if (z - x.z).abs() > tolerance.relative_depth * x.z {
             return Opinion::Other;
         }
-        let position = self.to_world(&(direction * z));
+        let position = self.to_world(&(direction * z + offset));
         let normal_in_world = self.rotation.tr_mul(&n);
         let back = reference.to_cam(&position);
         if back.z <= 0.0
-            || (reference.project(&back) - reference_px).norm() > tolerance.reprojection_px
+            || (reference.map.project(&back) - reference_px).norm() > tolerance.reprojection_px
             || normal_in_world.dot(normal) < tolerance.min_normal_cosine
         {
             return Opinion::Other;

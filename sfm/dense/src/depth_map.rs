@@ -1,7 +1,11 @@
 //! What dense matching finds in one image.
 
-use nalgebra::Vector3;
+use crate::RayOffsets;
+use nalgebra::{Vector2, Vector3};
 use scene::{Camera, ImageId, Raster, Rigid3};
+
+/// Each step leaves the share of the error by which offsets grow over the distance: centimetres over decimetres.
+const PROJECTION_STEPS: usize = 3;
 
 /// Depth, normal and confidence at the pixels of a distortion-free version of an image.
 ///
@@ -15,6 +19,8 @@ pub struct DepthMap {
     pub camera: Camera,
     /// Pose of the image.
     pub cam_from_world: Rigid3,
+    /// Behind a port, where the rays of the pixels pass; else they pass the projection centre.
+    pub offsets: Option<RayOffsets>,
     /// The images that it was matched with, best first.
     pub neighbours: Vec<ImageId>,
     /// z in the camera frame, 0 where it is unknown.
@@ -49,11 +55,35 @@ impl DepthMap {
     #[must_use]
     pub fn point_in_cam(&self, x: usize, y: usize) -> Option<Vector3<f64>> {
         let z = f64::from(*self.depth.get(x, y)?);
-        (z > 0.0).then(|| ray(&self.camera, x as f64 + 0.5, y as f64 + 0.5) * z)
+        (z > 0.0).then(|| self.along_ray(&Vector2::new(x as f64 + 0.5, y as f64 + 0.5), z))
+    }
+
+    /// The point with this z on the ray of a place in the raster.
+    pub(crate) fn along_ray(&self, pixel: &Vector2<f64>, z: f64) -> Vector3<f64> {
+        ray(&self.camera, pixel.x, pixel.y) * z + self.offset(pixel)
+    }
+
+    /// Where the ray of a place in the raster passes the plane z = 0.
+    pub(crate) fn offset(&self, pixel: &Vector2<f64>) -> Vector3<f64> {
+        self.offsets.as_ref().map_or(Vector3::zeros(), |o| o.at(pixel).push(0.0))
+    }
+
+    /// The place in the raster of a point in front of the camera, in its frame.
+    pub(crate) fn project(&self, x_in_cam: &Vector3<f64>) -> Vector2<f64> {
+        let p = self.camera.params();
+        let at = |x: f64, y: f64| Vector2::new(p[0] * x / x_in_cam.z + p[2], p[1] * y / x_in_cam.z + p[3]);
+        let mut pixel = at(x_in_cam.x, x_in_cam.y);
+        if let Some(offsets) = &self.offsets {
+            for _ in 0..PROJECTION_STEPS {
+                let o = offsets.at(&pixel);
+                pixel = at(x_in_cam.x - o.x, x_in_cam.y - o.y);
+            }
+        }
+        pixel
     }
 }
 
-/// Direction with z = 1 of a point of a pinhole image.
+/// Direction with z = 1 of a place of a pinhole image.
 pub(crate) fn ray(camera: &Camera, x: f64, y: f64) -> Vector3<f64> {
     let p = camera.params();
     Vector3::new((x - p[2]) / p[0], (y - p[3]) / p[1], 1.0)
@@ -128,6 +158,7 @@ mod tests {
             image: ImageId(0),
             camera,
             cam_from_world: Rigid3::identity(),
+            offsets: None,
             neighbours: Vec::new(),
             depth: Raster::from_vec(4, 1, vec![0.0, 2.0, 4.0, 9.0]).expect("four"),
             normal: Raster::filled(4, 1, [0.0; 3]),

@@ -3,7 +3,7 @@
 use crate::bytes::{storable_confidence, storable_normal};
 use crate::depth_map::remove_small_segments;
 use crate::patchmatch::{
-    Cell, GreyView, Kernel, Level, PatchWeights, Pinhole, SearchOptions, SourceView, Start, halve_grey, halve_valid, search,
+    Cell, GreyView, Kernel, Level, LevelOffsets, PatchWeights, Pinhole, SearchOptions, SourceView, Start, halve_grey, halve_valid, search,
 };
 use crate::seeds::seed_raster;
 use crate::view::{Rectified, rectify};
@@ -77,7 +77,7 @@ const SEGMENT_TOLERANCE: f32 = 0.02;
 /// Depth, normal and confidence of a view from its neighbours, between the depths `range` (z in the camera frame).
 ///
 /// Multi-view PatchMatch (see the module `patchmatch`) with normalised correlation in bilaterally weighted 11 x 11 windows, coarse to fine, on
-/// distortion-free versions of the views. Masked pixels of the reference are not computed, and masked ones of a neighbour support nothing.
+/// distortion-free versions of the views; behind a flat port along the refracted rays ([`crate::RayOffsets`]). Masked pixels of the reference are not computed, and masked ones of a neighbour support nothing.
 /// The result depends on the arguments alone, not on the number of threads. What one view alone claims is kept: [`crate::fuse`] asks
 /// whether others agree.
 ///
@@ -182,8 +182,10 @@ fn run_levels(
                 &Pinhole::at_level(&r.camera, index as u32),
                 &other_from_reference,
             )
+            .with_offsets(r.offsets.as_ref().map(|o| LevelOffsets::new(o, index as u32)))
         });
-        let level = Level { grey, valid, pinhole, sources: views.collect(), weights };
+        let offsets = rectified.offsets.as_ref().map(|o| LevelOffsets::new(o, index as u32));
+        let level = Level { grey, valid, pinhole, offsets, sources: views.collect(), weights };
         let first_pass = 1000 * index as u32;
         found = Some(match &found {
             None => {
@@ -197,7 +199,8 @@ fn run_levels(
 }
 
 fn to_map(reference: &View, rectified: Rectified, neighbours: &[&View], cells: Option<Raster<Cell>>, options: &DepthOptions) -> DepthMap {
-    let Rectified { camera, mut rgb, .. } = rectified;
+    let Rectified { camera, mut rgb, offsets, .. } = rectified;
+    let offsets = offsets.as_deref().cloned();
     let (w, h) = (rgb.width(), rgb.height());
     let mut depth = Raster::filled(w, h, 0.0);
     let (mut normal, mut confidence) = (Raster::filled(w, h, [0.0; 3]), Raster::filled(w, h, 0.0));
@@ -223,5 +226,15 @@ fn to_map(reference: &View, rectified: Rectified, neighbours: &[&View], cells: O
         }
     }
     let neighbours = neighbours.iter().map(|v| v.image).collect();
-    DepthMap { image: reference.image, camera, cam_from_world: reference.cam_from_world, neighbours, depth, normal, confidence, rgb }
+    DepthMap {
+        image: reference.image,
+        camera,
+        cam_from_world: reference.cam_from_world,
+        offsets,
+        neighbours,
+        depth,
+        normal,
+        confidence,
+        rgb,
+    }
 }

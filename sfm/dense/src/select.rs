@@ -100,14 +100,6 @@ pub fn depth_range(reconstruction: &Reconstruction, image: ImageId) -> Option<(f
     Some((quantile(&mut depths, 0.02) * 0.8, quantile(&mut depths, 0.98) * 1.5))
 }
 
-/// Median distance of the sparse points of `image` from its projection centre; `None` where it has none.
-#[must_use]
-pub fn median_distance(reconstruction: &Reconstruction, image: ImageId) -> Option<f64> {
-    let pose = pose_of(reconstruction, image)?;
-    let mut distances: Vec<f64> = points_of(reconstruction, image).map(|(p, _)| pose.apply(&p.xyz).norm()).collect();
-    (!distances.is_empty()).then(|| quantile(&mut distances, 0.5))
-}
-
 /// A pixel of known depth, from which the search may start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthSeed {

@@ -1,8 +1,10 @@
 //! Views, and their distortion-free counterparts in which planes induce exact homographies.
 
-use crate::DenseError;
+use crate::rays::FAR_M;
+use crate::{DenseError, RayOffsets};
 use nalgebra::{Vector2, Vector3};
 use scene::{Camera, CameraModel, ImageId, Mask, Raster, Rigid3};
+use std::sync::Arc;
 
 /// Field of view that a distortion-free raster may reach: tan of the half angle, 60 degrees.
 const MAX_TANGENT: f64 = 1.732;
@@ -54,10 +56,13 @@ pub(crate) struct Rectified {
     pub grey: Raster<u16>,
     /// [`INSIDE`] where the pixel is in the image, and [`ACTIVE`] where it is not masked either.
     pub valid: Raster<u8>,
+    /// Behind a port, where the rays of the pixels pass.
+    pub offsets: Option<Arc<RayOffsets>>,
 }
 
 /// Resamples a view to a pinhole camera of the same focal length, large enough for the whole field of view within
-/// [`MAX_GROWTH`] and [`MAX_TANGENT`]. A view that already is a pinhole is only copied.
+/// [`MAX_GROWTH`] and [`MAX_TANGENT`]. A view that already is a pinhole is only copied. Behind a port the raster is that of directions in the
+/// water, and [`RayOffsets`] tell where the rays pass.
 pub(crate) fn rectify(view: &View) -> Result<Rectified, DenseError> {
     view.validate()?;
     if view.camera.model() == CameraModel::Pinhole && view.camera.port().is_none() {
@@ -65,16 +70,24 @@ pub(crate) fn rectify(view: &View) -> Result<Rectified, DenseError> {
             || Raster::filled(view.rgb.width(), view.rgb.height(), INSIDE | ACTIVE),
             |mask| mask.map(|&m| if m >= 128 { INSIDE | ACTIVE } else { INSIDE }),
         );
-        return Ok(Rectified { camera: view.camera, grey: view.rgb.map(|&c| luma(c)), rgb: view.rgb.clone(), valid });
+        return Ok(Rectified { camera: view.camera, grey: view.rgb.map(|&c| luma(c)), rgb: view.rgb.clone(), valid, offsets: None });
     }
-    let camera = pinhole_for(&view.camera).map_err(|source| DenseError::Rectification { image: view.image, source })?;
+    let seen_by = view.camera.with_object_distance(FAR_M);
+    let camera = pinhole_for(&seen_by).map_err(|source| DenseError::Rectification { image: view.image, source })?;
     let (w, h) = (camera.width() as usize, camera.height() as usize);
-    let mut out = Rectified { camera, rgb: Raster::filled(w, h, [0; 3]), grey: Raster::filled(w, h, 0), valid: Raster::filled(w, h, 0) };
+    let mut out = Rectified {
+        camera,
+        rgb: Raster::filled(w, h, [0; 3]),
+        grey: Raster::filled(w, h, 0),
+        valid: Raster::filled(w, h, 0),
+        offsets: None,
+    };
+    out.offsets = RayOffsets::new(&seen_by, &camera).map(Arc::new);
     let &[fx, fy, cx, cy] = camera.params() else { return Ok(out) };
     for y in 0..h {
         for x in 0..w {
             let direction = Vector3::new((x as f64 + 0.5 - cx) / fx, (y as f64 + 0.5 - cy) / fy, 1.0);
-            let Some(pixel) = view.camera.project_direction(&direction) else { continue };
+            let Some(pixel) = seen_by.project_direction(&direction) else { continue };
             let Some((colour, grey)) = bilinear(&view.rgb, &pixel) else { continue };
             out.rgb[(x, y)] = colour;
             out.grey[(x, y)] = grey;

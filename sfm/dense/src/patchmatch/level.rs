@@ -1,6 +1,7 @@
 //! The search on one level of the pyramid.
 
 use super::grid::{Cell, Grid};
+use super::offsets::LevelOffsets;
 use super::patch::PatchWeights;
 use super::plane::{Pinhole, Plane};
 use super::propagate::{Pass, SearchOptions, score_all, update};
@@ -13,6 +14,8 @@ pub(crate) struct Level<'a> {
     pub grey: Raster<u16>,
     pub valid: Raster<u8>,
     pub pinhole: Pinhole,
+    /// Behind a port, where the rays of the reference pass.
+    pub offsets: Option<LevelOffsets>,
     pub sources: Vec<SourceView>,
     pub weights: &'a PatchWeights,
 }

@@ -98,8 +98,9 @@ struct Pixel<'a> {
 
 impl<'a> Pixel<'a> {
     fn new(level: &'a Level, options: &'a SearchOptions, patch: &'a Patch, at: [f32; 2], cell: Cell, scratch: &'a mut Scratch) -> Self {
-        let most = level.sources.iter().map(|s| s.sensitivity(at[0], at[1], cell.plane.w)).fold(0.0, f32::max);
-        let question = Question { sources: &level.sources, patch, at, noise: level.weights.noise_variance, best: options.best };
+        let offset = level.offsets.as_ref().map_or([0.0; 2], |o| o.at(at[0], at[1]));
+        let most = level.sources.iter().map(|s| s.sensitivity(at[0], at[1], cell.plane.w, &offset)).fold(0.0, f32::max);
+        let question = Question { sources: &level.sources, patch, at, offset, noise: level.weights.noise_variance, best: options.best };
         Self { level, options, question, scratch, cell, inverse_per_px: 1.0 / most.max(1e-20) }
     }
 

@@ -1,6 +1,7 @@
 //! How well a plane explains what the neighbours see.
 
 use super::grey::GreyView;
+use super::offsets::LevelOffsets;
 use super::patch::{DX, DY, Patch, RADIUS, SAMPLES, reduce};
 use super::plane::{Pinhole, Plane};
 use crate::view::{ACTIVE, INSIDE};
@@ -22,6 +23,11 @@ pub(crate) struct SourceView {
     /// Rows of A in (u, v, 1) ~ A (x, y, 1) + b / z, all in index coordinates.
     pub a: [[f32; 3]; 3],
     pub b: [f32; 3],
+    /// What an offset of the reference's ray adds to b: rows, by its two components.
+    turn: [[f32; 2]; 3],
+    /// Focal lengths, and where the rays of this view pass if it is behind a port.
+    focal: [f32; 2],
+    offsets: Option<LevelOffsets>,
 }
 
 impl SourceView {
@@ -43,25 +49,58 @@ impl SourceView {
         let a = matrix(other) * other_from_reference.rotation_matrix() * inverse;
         let b: Vector3<f64> = matrix(other) * other_from_reference.translation;
         let row = |i: usize| [a[(i, 0)] as f32, a[(i, 1)] as f32, a[(i, 2)] as f32];
-        Self { grey, a: [row(0), row(1), row(2)], b: [b.x as f32, b.y as f32, b.z as f32] }
+        let turned = matrix(other) * other_from_reference.rotation_matrix();
+        let turn = |i: usize| [turned[(i, 0)] as f32, turned[(i, 1)] as f32];
+        Self {
+            grey,
+            a: [row(0), row(1), row(2)],
+            b: [b.x as f32, b.y as f32, b.z as f32],
+            turn: [turn(0), turn(1), turn(2)],
+            focal: [other.fx, other.fy],
+            offsets: None,
+        }
+    }
+
+    /// The same view behind a port.
+    pub fn with_offsets(self, offsets: Option<LevelOffsets>) -> Self {
+        Self { offsets, ..self }
+    }
+
+    /// b for a reference whose ray passes at an offset.
+    #[inline(always)]
+    fn shifted(&self, offset: &[f32; 2]) -> [f32; 3] {
+        [0, 1, 2].map(|i| self.b[i] + (self.turn[i][0] * offset[0] + self.turn[i][1] * offset[1]))
+    }
+
+    /// How far the image of a point at homogeneous coordinates `h`, of inverse depth `w` in the reference, is from that of its direction.
+    #[inline(always)]
+    fn moved_by_port(&self, h: &[f32; 3], w: f32) -> Option<[f32; 2]> {
+        let offsets = self.offsets.as_ref()?;
+        let inverse = 1.0 / h[2];
+        let (u, v, inverse_depth) = (h[0] * inverse, h[1] * inverse, w * inverse);
+        let by = |o: [f32; 2]| [-self.focal[0] * o[0] * inverse_depth, -self.focal[1] * o[1] * inverse_depth];
+        // The offset belongs to the place that is looked for: a second look there leaves a hundredth of a pixel.
+        let first = by(offsets.at(u, v));
+        Some(by(offsets.at(u + first[0], v + first[1])))
     }
 
     /// Length of d(u, v) / d(1/z): how far the pixel of this view moves, pixels for a unit of inverse depth.
     #[inline(always)]
-    pub fn sensitivity(&self, x: f32, y: f32, w: f32) -> f32 {
-        let [hx, hy, hz] = self.homogeneous(x, y, w);
+    pub fn sensitivity(&self, x: f32, y: f32, w: f32, offset: &[f32; 2]) -> f32 {
+        let b = self.shifted(offset);
+        let [hx, hy, hz] = self.homogeneous(x, y, w, &b);
         if hz <= 0.0 {
             return 0.0;
         }
         let inverse = 1.0 / hz;
         let (u, v) = (hx * inverse, hy * inverse);
-        let (du, dv) = ((self.b[0] - u * self.b[2]) * inverse, (self.b[1] - v * self.b[2]) * inverse);
+        let (du, dv) = ((b[0] - u * b[2]) * inverse, (b[1] - v * b[2]) * inverse);
         (du * du + dv * dv).sqrt()
     }
 
     #[inline(always)]
-    fn homogeneous(&self, x: f32, y: f32, w: f32) -> [f32; 3] {
-        [0, 1, 2].map(|i| self.a[i][0] * x + self.a[i][1] * y + self.a[i][2] + self.b[i] * w)
+    fn homogeneous(&self, x: f32, y: f32, w: f32, b: &[f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|i| self.a[i][0] * x + self.a[i][1] * y + self.a[i][2] + b[i] * w)
     }
 }
 
@@ -72,6 +111,8 @@ pub(crate) struct Question<'a> {
     pub patch: &'a Patch,
     /// The pixel.
     pub at: [f32; 2],
+    /// Where its ray passes; 0 without a port.
+    pub offset: [f32; 2],
     /// Variance of the noise.
     pub noise: f32,
     /// How many neighbours count, 1..=[`MAX_SOURCES`].
@@ -139,9 +180,9 @@ fn score(question: &Question, plane: Plane, scratch: &mut Scratch) -> f32 {
 /// One minus the normalised correlation between the window and its image in one neighbour; `None` where that does not see it.
 #[inline(always)]
 fn correlate(source: &SourceView, question: &Question, plane: Plane, scratch: &mut Scratch) -> Option<f32> {
-    let Question { patch, at: [x, y], noise, .. } = *question;
+    let Question { patch, at: [x, y], offset, noise, .. } = *question;
     let grey = &source.grey;
-    let window = Window::new(source, x, y, plane);
+    let window = Window::new(source, x, y, &offset, plane);
     // The image of the window is convex: its corners decide. The margin is far above rounding.
     let (right, bottom) = (grey.width as f32 - 1.01, grey.height as f32 - 1.01);
     const R: f32 = RADIUS as f32;
@@ -188,11 +229,18 @@ struct Window {
 
 impl Window {
     #[inline(always)]
-    fn new(source: &SourceView, x: f32, y: f32, plane: Plane) -> Self {
-        let mut window = Self { centre: source.homogeneous(x, y, plane.w), along_x: [0.0; 3], along_y: [0.0; 3] };
+    fn new(source: &SourceView, x: f32, y: f32, offset: &[f32; 2], plane: Plane) -> Self {
+        let b = source.shifted(offset);
+        let mut window = Self { centre: source.homogeneous(x, y, plane.w, &b), along_x: [0.0; 3], along_y: [0.0; 3] };
         for i in 0..3 {
-            window.along_x[i] = source.a[i][0] + source.b[i] * plane.gx;
-            window.along_y[i] = source.a[i][1] + source.b[i] * plane.gy;
+            window.along_x[i] = source.a[i][0] + b[i] * plane.gx;
+            window.along_y[i] = source.a[i][1] + b[i] * plane.gy;
+        }
+        if let Some(moved) = source.moved_by_port(&window.centre, plane.w) {
+            for h in [&mut window.centre, &mut window.along_x, &mut window.along_y] {
+                h[0] += moved[0] * h[2];
+                h[1] += moved[1] * h[2];
+            }
         }
         window
     }

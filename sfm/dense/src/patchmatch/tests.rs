@@ -48,7 +48,8 @@ fn a_view_matches_itself_and_only_at_the_right_place() {
     // A sideways step of 0.5 at inverse depth 0.1 is 5 pixels: the source shows the same texture 5 pixels further.
     let shifted = Raster::from_vec(64, 48, (0..64 * 48).map(|i| textured(80, 48)[(i % 64 + 5, i / 64)]).collect()).expect("size");
     let sources = [source(&shifted, &Rigid3::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::new(-0.5, 0.0, 0.0)))];
-    let question = Question { sources: &sources, patch: &patch, at: [30.0, 24.0], noise: weights.noise_variance, best: 1 };
+    let question =
+        Question { sources: &sources, patch: &patch, at: [30.0, 24.0], offset: [0.0; 2], noise: weights.noise_variance, best: 1 };
     let cost = |w| Kernel::Portable.score(&question, Plane { w, gx: 0.0, gy: 0.0 }, &mut Scratch::new());
     assert!(cost(0.1) < 1e-3, "{}", cost(0.1));
     assert!(cost(0.13) > 0.05 && cost(0.07) > 0.05, "{} {}", cost(0.13), cost(0.07));
@@ -67,7 +68,14 @@ fn all_kernels_give_the_same_bits() {
         for x in 0..64 {
             let Some(patch) = Patch::new(&grey, &Raster::filled(64, 48, 3), x, y, &weights) else { continue };
             let plane = Plane { w: 0.1 + 0.003 * x as f32, gx: 0.001, gy: 0.0005 * (y as f32 - 20.0) / 20.0 };
-            let question = Question { sources: &sources, patch: &patch, at: [x as f32, y as f32], noise: weights.noise_variance, best: 2 };
+            let question = Question {
+                sources: &sources,
+                patch: &patch,
+                at: [x as f32, y as f32],
+                offset: [0.0; 2],
+                noise: weights.noise_variance,
+                best: 2,
+            };
             let cost = |kernel: Kernel| kernel.score(&question, plane, &mut Scratch::new()).to_bits();
             assert_eq!(cost(Kernel::Portable), cost(Kernel::detect()));
             compared += usize::from(f32::from_bits(cost(Kernel::Portable)) < NO_MATCH);

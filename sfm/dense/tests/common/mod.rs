@@ -64,18 +64,32 @@ fn colour(x: &Vector3<f64>, look: Look) -> [f64; 3] {
 
 /// A view from `position`, turned by `turn` (axis times angle) from looking along +z.
 pub fn view(id: usize, camera: Camera, position: [f64; 3], turn: [f64; 3], look: Look) -> View {
+    scaled_view(id, camera, position, turn, look, 1.0)
+}
+
+/// The ray of a pixel in the frame of the camera, in water if that is behind a port: a point and the unit direction.
+fn water_ray(camera: &Camera, pixel: &Vector2<f64>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    let in_air = camera.in_air().ray(pixel)?;
+    let Some(port) = camera.port() else { return Some((Vector3::zeros(), in_air)) };
+    let at = |object_distance_m| scene::FlatPort { object_distance_m, ..*port }.point_at_object_distance(&in_air);
+    let (near, far) = (at(0.1)?, at(1.0)?);
+    Some((near, (far - near).normalize()))
+}
+
+/// The same of the scene `scale` times as large, from a position `scale` times as far.
+pub fn scaled_view(id: usize, camera: Camera, position: [f64; 3], turn: [f64; 3], look: Look, scale: f64) -> View {
     let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
     let position = Vector3::from(position);
-    let cam_from_world = Rigid3::new(rotation, -(rotation * position));
+    let cam_from_world = Rigid3::new(rotation, -(rotation * position) * scale);
     let (w, h) = (camera.width() as usize, camera.height() as usize);
     let pixel = |i: usize| {
         let mut sum = [0.0; 3];
         // Four rays a pixel against aliasing.
         for (dx, dy) in [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)] {
-            let Some(ray) = camera.ray(&Vector2::new((i % w) as f64 + dx, (i / w) as f64 + dy)) else { continue };
-            let direction = rotation.inverse() * ray;
-            if let Some((distance, _)) = cast(&position, &direction) {
-                let c = colour(&(position + direction * distance), look);
+            let Some((from, ray)) = water_ray(&camera, &Vector2::new((i % w) as f64 + dx, (i / w) as f64 + dy)) else { continue };
+            let (origin, direction) = (position + rotation.inverse() * from / scale, rotation.inverse() * ray);
+            if let Some((distance, _)) = cast(&origin, &direction) {
+                let c = colour(&(origin + direction * distance), look);
                 sum = [0, 1, 2].map(|k| sum[k] + c[k] / 4.0);
             }
         }
@@ -98,6 +112,13 @@ pub fn views(camera: Camera, look: Look) -> Vec<View> {
     let at = [[0.0, 0.0, 0.0], [-0.6, 0.0, 0.1], [0.6, 0.1, 0.0], [0.0, 0.6, -0.2], [0.1, -0.5, 0.0]];
     let turn = [[0.0, 0.0, 0.0], [0.0, -0.1, 0.02], [0.0, 0.1, 0.0], [0.1, 0.0, 0.0], [-0.08, 0.0, -0.05]];
     (0..5).map(|i| view(i, camera, at[i], turn[i], look)).collect()
+}
+
+/// The same of the scene `scale` times as large.
+pub fn scaled_views(camera: Camera, scale: f64) -> Vec<View> {
+    let poses = views(pinhole(), Look::Bare);
+    let pose = |v: &View| (v.cam_from_world.centre().into(), v.cam_from_world.rotation.scaled_axis().into());
+    poses.iter().map(pose).enumerate().map(|(i, (at, turn))| scaled_view(i, camera, at, turn, Look::Textured, scale)).collect()
 }
 
 /// How a depth map compares with the scene.
