@@ -27,10 +27,13 @@ pub struct Card {
     pub classes: [String; 2],
     /// What goes in.
     pub input: InputCard,
-    /// Logit of structure from which a patch is split, one a level of the quadtree from the whole image on; the last one also holds below. Empty: 0 for all.
-    /// At the last level 0 decides, structure being as likely as not.
+    /// Logit of structure from which a patch is split, one a level of the quadtree from the whole image on; the last one also holds below. Empty: `decision` for all.
+    /// At the last level `decision` decides.
     #[serde(default)]
     pub thresholds: Vec<f32>,
+    /// Logit from which a cell is structure. At 0, where nothing is said, it is as likely as not; below, structure that is doubted is kept, and some water with it.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub decision: f32,
     /// A connected part of the structure is kept where one of its cells reaches this logit: hysteresis. None: every part is kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub core: Option<f32>,
@@ -118,8 +121,8 @@ impl Card {
             return Err(wrong("maps.outputs must name outputs, maps.long_sides_px sizes from 32 to 16384".to_owned()));
         }
         let of_maps = card.maps.iter().map(|m| &m.bias);
-        if card.thresholds.iter().chain(&card.core).chain(of_maps).any(|t| t.is_nan()) {
-            return Err(wrong("thresholds, core and bias must be numbers".to_owned()));
+        if card.thresholds.iter().chain(&card.core).chain(of_maps).any(|t| t.is_nan()) || !card.decision.is_finite() {
+            return Err(wrong("thresholds, core, decision and bias must be numbers".to_owned()));
         }
         Ok(card)
     }
@@ -135,6 +138,10 @@ impl Card {
     pub fn structure_index(&self) -> usize {
         usize::from(self.classes[1] == "structure")
     }
+}
+
+fn is_zero(value: &f32) -> bool {
+    *value == 0.0
 }
 
 #[cfg(test)]
@@ -159,6 +166,9 @@ std = [1.0, 1.0, 1.0]
         let card = Card::parse(GOOD, Path::new("mine.toml")).expect("good");
         assert_eq!((card.structure_index(), card.core, card.maps.is_none()), (1, None, true));
         assert_eq!(Card::parse(&card.to_toml(), Path::new("mine.toml")).expect("good"), card);
+        assert_eq!(card.decision, 0.0);
+        let careful = Card { decision: -1.0, ..card.clone() };
+        assert_eq!(Card::parse(&careful.to_toml(), Path::new("mine.toml")).expect("good"), careful);
         let turned = GOOD.replace(r#"["background", "structure"]"#, r#"["structure", "background"]"#);
         assert_eq!(Card::parse(&turned, Path::new("mine.toml")).expect("good").structure_index(), 0);
     }
@@ -177,6 +187,7 @@ std = [1.0, 1.0, 1.0]
             ("width = 64", "width = 0", "input.width"),
             ("std = [1.0", "std = [0.0", "input.std"),
             ("mean = [0.0", "mean = [nan", "input.mean"),
+            ("output =", "decision = nan\noutput =", "decision"),
             ("output =", "outptu =", "outptu"),
             ("sha256 = \"00\"", "", "sha256"),
         ] {

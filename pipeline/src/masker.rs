@@ -40,6 +40,12 @@ impl<'c> Masker<'c> {
         Ok(masker)
     }
 
+    /// SHA-256 of the card of the model, which states that of its file: what masks depend on. Thresholds stand on the card.
+    #[must_use]
+    pub fn card_hash(&self) -> Option<String> {
+        self.model.as_ref().map(|m| models::sha256(m.card().to_toml().as_bytes()))
+    }
+
     /// Name and SHA-256 of the model.
     #[must_use]
     pub fn model(&self) -> Option<(&str, &str)> {

@@ -57,7 +57,7 @@ pub struct MlMask {
 }
 
 /// Masks an image by split and merge with a classifier, see [`crate::quadtree::segment`]. By [`Route::Patches`] a patch is split where its logit reaches the threshold of its level on
-/// the card of the model, by [`Route::Shared`] where one of its cells is structure; the patches of the last level are structure from 0 on, where it is as likely as not. The cells are cleaned up then, see [`clean_up`].
+/// the card of the model, by [`Route::Shared`] where one of its cells is structure; the patches of the last level are structure from the card's `decision` on. The cells are cleaned up then, see [`clean_up`].
 ///
 /// The route [`Route::Shared`] falls back to [`Route::Patches`] where the card names no maps.
 ///
@@ -71,9 +71,9 @@ pub fn ml_mask(rgb: &Raster<[u8; 3]>, model: &Model, options: &MlOptions) -> Res
     let (found, last, patches) = match (&card.maps, options.route) {
         (Some(maps), Route::Shared) => {
             let pyramid = maps::logits(rgb, model, maps, levels)?;
-            search(rgb, maps::Lookup { pyramid }, &[], levels)?
+            search(rgb, maps::Lookup { pyramid }, &[], card.decision, levels)?
         }
-        _ => search(rgb, patches::Batches { model }, &card.thresholds, levels)?,
+        _ => search(rgb, patches::Batches { model }, &card.thresholds, card.decision, levels)?,
     };
     let mut cells = CellMask::new(levels);
     for patch in found {
@@ -116,6 +116,8 @@ trait Logits {
 struct Thresholded<'a, L> {
     logits: L,
     thresholds: &'a [f32],
+    /// From which a patch of the last level is structure.
+    decision: f32,
     levels: usize,
     /// Patches that were classified.
     count: usize,
@@ -130,8 +132,8 @@ impl<L: Logits> PatchClassifier for Thresholded<'_, L> {
         let logits = self.logits.logits(image, patches)?;
         self.count += patches.len();
         self.last = patches.iter().copied().zip(logits.iter().copied()).collect();
-        let split = |level: usize| self.thresholds.get(level).or(self.thresholds.last()).copied().unwrap_or(0.0);
-        let threshold = |level: usize| if level < self.levels { split(level) } else { 0.0 };
+        let split = |level: usize| self.thresholds.get(level).or(self.thresholds.last()).copied().unwrap_or(self.decision);
+        let threshold = |level: usize| if level < self.levels { split(level) } else { self.decision };
         Ok(patches.iter().zip(&logits).map(|(patch, &logit)| logit >= threshold(patch.level)).collect())
     }
 }
@@ -139,8 +141,8 @@ impl<L: Logits> PatchClassifier for Thresholded<'_, L> {
 /// Leaves, and what the last level classified; the number of all patches.
 type Found = (Vec<Patch>, Vec<(Patch, f32)>, usize);
 
-fn search<L: Logits>(image: &Raster<[u8; 3]>, logits: L, thresholds: &[f32], levels: usize) -> Result<Found, ModelError> {
-    let mut classifier = Thresholded { logits, thresholds, levels, count: 0, last: Vec::new() };
+fn search<L: Logits>(image: &Raster<[u8; 3]>, logits: L, thresholds: &[f32], decision: f32, levels: usize) -> Result<Found, ModelError> {
+    let mut classifier = Thresholded { logits, thresholds, decision, levels, count: 0, last: Vec::new() };
     let leaves = leaves(image, &mut classifier, levels)?;
     // Where a coarser level found nothing, no cell was looked at.
     classifier.last.retain(|(patch, _)| patch.level == levels);

@@ -57,6 +57,22 @@ fn without_a_core_a_part_goes() {
 }
 
 #[test]
+fn the_decision_of_the_card_is_where_structure_begins() {
+    // Logits of the boxes are 16 and 1, that of the water is -24.
+    for (decision, faint, water) in [(2.0, 0.0, 0.0), (-1.0, 1.0, 0.0), (-25.0, 1.0, 1.0)] {
+        for route in [Route::Shared, Route::Patches] {
+            let Some(model) = red_is_structure(|card| (card.decision, card.thresholds) = (decision, vec![-30.0])) else { return };
+            let found = ml_mask(&picture(), &model, &MlOptions { route, levels: 5, ..MlOptions::default() }).expect("runs");
+            assert_eq!(
+                [share(&found.mask, 32..96), share(&found.mask, 160..224), share(&found.mask, 0..32)],
+                [1.0, faint, water],
+                "{decision} {route:?}"
+            );
+        }
+    }
+}
+
+#[test]
 fn specks_go_and_holes_are_filled() {
     let Some(model) = red_is_structure(|_| ()) else { return };
     let mut rgb = picture();

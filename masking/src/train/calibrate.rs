@@ -23,8 +23,6 @@ const LOST_BY_LEVEL: f64 = 2e-4;
 const LOST_BY_CORE: f64 = 5e-4;
 /// The core asks for no more certainty than this, 99 %: logits of real images spread less than those of the images trained with.
 const MAX_CORE: f32 = 5.0;
-/// No threshold above this: there, structure is as likely as not.
-const MAX_THRESHOLD: f32 = 0.0;
 /// Images that are enough to calibrate with.
 const ENOUGH: usize = 40;
 /// Images with the smallest intersection over union that are told.
@@ -64,7 +62,7 @@ pub(super) fn calibrate<E: std::error::Error + Send + 'static>(
     let threshold = |of: &dyn Fn(&OfImage) -> &Weighted, lost: f64| largest_losing(found.iter().flat_map(of), lost * total);
     let mut card: Card = model.card().clone();
     card.thresholds = vec![f32::NEG_INFINITY; ALWAYS_SPLIT];
-    card.thresholds.extend((ALWAYS_SPLIT..=PATCH_LEVELS).map(|l| threshold(&|f| &f.patches[l], LOST_BY_LEVEL).min(MAX_THRESHOLD)));
+    card.thresholds.extend((ALWAYS_SPLIT..=PATCH_LEVELS).map(|l| threshold(&|f| &f.patches[l], LOST_BY_LEVEL).min(card.decision)));
     card.core = Some(threshold(&|f| &f.parts, LOST_BY_CORE).min(MAX_CORE));
     let model = Model::new(card, format!("{}.onnx", model.card().name).into(), Cow::Owned(model.bytes().to_vec()), runtime)?;
     let (mean_iou, worst) = judge(&model, images, load)?;
@@ -95,16 +93,16 @@ fn of_image<E: std::error::Error + 'static>(model: &Model, rgb: &Raster<[u8; 3]>
     let patches = cell_logits(rgb, model, Route::Patches, PATCH_LEVELS.min(levels))?;
     Ok(OfImage {
         structure: f64::from(areas[0].data()[0]),
-        parts: parts(&shared, &areas[levels], levels),
+        parts: parts(&shared, &areas[levels], levels, model.card().decision),
         patches: (0..=PATCH_LEVELS).map(|l| if l <= levels { weighted(&patches, l) } else { Vec::new() }).collect(),
     })
 }
 
-/// The connected parts of the cells with logits above 0: their largest logit, and the area of structure in them.
-fn parts(logits: &CellLogits, areas: &Raster<f32>, level: usize) -> Weighted {
+/// The connected parts of the cells with logits from `decision` on: their largest logit, and the area of structure in them.
+fn parts(logits: &CellLogits, areas: &Raster<f32>, level: usize, decision: f32) -> Weighted {
     let side = 1usize << level;
     let values = logits.of_level(level);
-    let mut left = BitMask::from_test(side, side, values, |v| v >= 0.0);
+    let mut left = BitMask::from_test(side, side, values, |v| v >= decision);
     let mut parts = Weighted::new();
     let scale = 1.0 / (side * side) as f64;
     for start in 0..side * side {

@@ -32,6 +32,9 @@ pub struct TrainOptions {
     pub patches: usize,
     /// Weight of the squared weights of the standardised features.
     pub regularisation: f64,
+    /// Logit from which a cell is structure. Below 0: what a mask loses is lost for good, while water that it keeps is still told by later stages (its matches
+    /// and depths disagree). In murky water the logits of faint sea floor lie low: on dives for this choice alone, -1 (27 %) raised recall and intersection over union both.
+    pub decision: f32,
     /// Share of the images that are held out.
     pub held_out: f64,
     /// Which images are held out and which patches are taken.
@@ -46,6 +49,7 @@ impl Default for TrainOptions {
             cells: 40,
             patches: 60,
             regularisation: 1e-3,
+            decision: -1.0,
             held_out: 0.2,
             seed: 1,
         }
@@ -193,6 +197,7 @@ fn assemble(backbone: &Backbone, runtime: &Runtime, weights: &[f32], bias: f32, 
         classes: ["background".to_owned(), "structure".to_owned()],
         input: backbone.input().clone(),
         thresholds: Vec::new(),
+        decision: options.decision,
         core: None,
         maps: Some(MapsCard { outputs, bias, long_sides_px: options.long_sides_px.clone() }),
         figures: None,

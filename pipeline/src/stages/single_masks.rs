@@ -88,10 +88,11 @@ impl Singles<'_> {
         cut: bool,
     ) -> Result<Result<Fingerprint, String>> {
         let (masker, threshold) = (&self.masker, self.thresholds[image.camera]);
+        let card = masker.card_hash().unwrap_or_default();
         let parts = [
             ("image", image.content.as_bytes().as_slice()),
             ("threshold", threshold.as_slice()),
-            ("model", masker.model().map_or("", |m| m.1).as_bytes()),
+            ("model", card.as_bytes()),
             ("runtime", masker.library().unwrap_or_default().as_bytes()),
         ];
         let key = self.key(image, &parts, cut);
