@@ -116,6 +116,14 @@ fn a_model_is_trained_with_corrected_proposals() {
     dive.write("dive.toml", &format!("{DIVE}[mask]\nstrategy = \"ml\"\nmodel = \"models/mine.onnx\"\n"));
     let report: Value = serde_json::from_str(&dive.ok(&["run", "--until", "mask", "--json"])).unwrap();
     assert_eq!(report["masks"]["classifier"]["name"], "mine");
+    // What decides stands on the card: with another one no mask is taken over.
+    let masked = |report: &Value| report["masks"]["masked_ratio"].as_f64().unwrap();
+    let card = std::fs::read_to_string(dive.path("models/mine.toml")).unwrap();
+    assert!(masked(&report) < 1.0 && card.contains("decision = -1.0"), "{card}");
+    dive.write("models/mine.toml", &card.replace("decision = -1.0", "decision = 50.0"));
+    let none: Value = serde_json::from_str(&dive.ok(&["run", "--until", "mask", "--json"])).unwrap();
+    assert_eq!(masked(&none), 1.0, "{none:#}");
+    dive.write("models/mine.toml", &card);
     // Another file than the card describes.
     std::fs::write(dive.path("models/mine.onnx"), &again[..again.len() - 1]).unwrap();
     let (code, error) = dive.fails(&["run", "--until", "mask"]);
@@ -215,6 +223,84 @@ fn what_moves_is_cut_out_of_the_masks_of_every_strategy() {
     dive.write("dive.toml", &format!("{DIVE}[mask]\nmoving = \"moved\"\n"));
     let (code, error) = dive.fails(&["run", "--until", "mask"]);
     assert!(code == 2 && error.contains("mask.moving") && error.contains("there is no folder"), "{code} {error}");
+}
+
+/// A network by hand: an input and an output of given axes, 0 for any length, joined by one operator.
+fn network(operator: &str, input: &[i64], output: (&str, &[i64])) -> Vec<u8> {
+    fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
+        assert!(bytes.len() < 128, "one byte of length");
+        [&[number << 3 | 2, bytes.len() as u8], bytes].concat()
+    }
+    let tensor = |name: &str, axes: &[i64]| {
+        let axes = axes.iter().flat_map(|&n| field(1, &if n > 0 { vec![0x08, n as u8] } else { field(2, b"n") }));
+        let tensor = [vec![0x08, 1], field(2, &axes.collect::<Vec<u8>>())].concat();
+        [field(1, name.as_bytes()), field(2, &field(1, &tensor))].concat()
+    };
+    let node = [field(1, b"image"), field(2, output.0.as_bytes()), field(4, operator.as_bytes())].concat();
+    let graph = [field(1, &node), field(2, b"g"), field(11, &tensor("image", input)), field(12, &tensor(output.0, output.1))].concat();
+    [vec![0x08, 8], field(7, &graph), field(8, &[0x10, 17])].concat()
+}
+
+/// Networks that are no classifiers of two classes, a file that is none, a card that is missing: each is named with the reason, before any image is masked.
+#[test]
+fn models_that_cannot_be_used_are_told() {
+    if !has_runtime() {
+        return;
+    }
+    let dive = Dive::of_noise();
+    dive.write("dive.toml", "[[camera]]\nimages = \"frames/left\"\n[mask]\nstrategy = \"ml\"\nmodel = \"mine.onnx\"\n");
+    let card = |bytes: &[u8]| {
+        format!(
+            "name = \"mine\"\nsha256 = \"{}\"\noutput = \"logits\"\nclasses = [\"background\", \"structure\"]\n[input]\nname = \"image\"\nwidth = 8\nheight = 8\n\
+             mean = [0.0, 0.0, 0.0]\nstd = [1.0, 1.0, 1.0]\n",
+            models::sha256(bytes)
+        )
+    };
+    let two = network("Flatten", &[0, 3, 0, 0], ("logits", &[0, 2]));
+    let refused: [(Vec<u8>, &[&str]); 6] = [
+        (
+            network("Flatten", &[0, 3, 0, 0], ("logits", &[0, 3])),
+            &["no classifier of two classes", "logits is [-1, 3]", "[n, 2] is needed"],
+        ),
+        (network("Identity", &[0, 3, 0, 0], ("logits", &[0, 3, 0, 0])), &["logits is [-1, 3, -1, -1]"]),
+        (network("Identity", &[0, 2], ("logits", &[0, 2])), &["its input is [-1, 2]", "[n, 3, 8, 8] is needed"]),
+        (network("Identity", &[0, 3, 0], ("logits", &[0, 3, 0])), &["its input is [-1, 3, -1]"]),
+        (network("Flatten", &[0, 1, 0, 0], ("logits", &[0, 2])), &["its input is [-1, 1, -1, -1]"]),
+        (two[..two.len() / 2].to_vec(), &["mine.onnx cannot be used"]),
+    ];
+    for (bytes, expected) in refused {
+        std::fs::write(dive.path("mine.onnx"), &bytes).unwrap();
+        dive.write("mine.toml", &card(&bytes));
+        let (code, error) = dive.fails(&["run", "--until", "mask"]);
+        assert!(code == 1 && error.contains("mine.onnx") && expected.iter().all(|e| error.contains(e)), "{code} {error}");
+    }
+    // All that its axes do not say shows when it runs: 8 x 8 pixels of three colours are 192 values, not 2.
+    std::fs::write(dive.path("mine.onnx"), network("Flatten", &[0, 3, 0, 0], ("logits", &[0, 0]))).unwrap();
+    dive.write("mine.toml", &card(&std::fs::read(dive.path("mine.onnx")).unwrap()));
+    let (code, error) = dive.fails(&["run", "--until", "mask"]);
+    assert!(code == 1 && error.contains("[1, 192] for 1 patches; [1, 2] is needed"), "{code} {error}");
+    std::fs::remove_file(dive.path("mine.toml")).unwrap();
+    let (code, error) = dive.fails(&["run", "--until", "mask"]);
+    assert!(code == 1 && error.contains("mine.onnx has no card") && error.contains("mine.toml"), "{code} {error}");
+}
+
+/// Images of a few pixels have fewer levels than asked for, and a mask of their size by every strategy.
+#[test]
+fn images_smaller_than_the_smallest_cell_are_masked() {
+    let strategies: &[&str] = if has_runtime() { &["ip", "ml", "ip+ml"] } else { &["ip"] };
+    for (width, height) in [(5, 3), (1, 1), (130, 2)] {
+        let dive = Dive::empty();
+        std::fs::create_dir(dive.path("frames")).unwrap();
+        for i in 0..2 {
+            std::fs::write(dive.path(&format!("frames/{i}.png")), support::png(width, height, i)).unwrap();
+        }
+        dive.write("dive.toml", "[[camera]]\nname = \"C1\"\nimages = \"frames\"\n");
+        dive.ok(&["mask", "--strategy", &strategies.join(","), "--out", "masks"]);
+        for strategy in strategies {
+            let mask = imaging::decode_grey_u8(&std::fs::read(dive.path(&format!("masks/{strategy}/C1/1.png"))).unwrap()).unwrap();
+            assert_eq!((mask.width(), mask.height()), (width, height), "{strategy}");
+        }
+    }
 }
 
 /// Masks of another size and with grey values, grey images, odd sizes.
