@@ -6,18 +6,19 @@ use super::interior::{self, Start};
 use super::loops;
 use crate::config::{Config, FeatureMethod, PairRule};
 use crate::error::NoResult;
-use crate::formats::{StoredFeatures, read_matches, write_matches};
+use crate::formats::{read_matches, write_matches};
 use crate::stage::{Outcome, Stage, Work, no_inputs};
 use crate::store::Fingerprint;
-use ::features::{ImageForPair, MatchOptions, NccOptions, PairVerdict, VerifyOptions};
+use ::features::{GuidedOptions, MatchImage, MatchOptions, NccOptions, PairVerdict, VerifyOptions};
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 use scene::{ImageId, PairConfiguration, VerifiedPair};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::ops::AddAssign;
 
 /// The stage.
-pub const STAGE: Stage = Stage { name: "matching", version: 2, upstream: &["ingest", "features"], options, inputs: no_inputs, work };
+pub const STAGE: Stage = Stage { name: "matching", version: 3, upstream: &["ingest", "features"], options, inputs: no_inputs, work };
 
 /// Images whose pairs with later ones are made together; a run that is stopped loses their work.
 const ROWS_AT_ONCE: usize = 2;
@@ -56,30 +57,55 @@ fn work(work: &Work<'_>) -> Result<Outcome> {
     let tried: usize = rows.values().map(Vec::len).sum();
     work.progress.begin("matching", tried);
     let matcher = Matcher { work, list: &list, starts: &starts };
-    let todo = matcher.reuse(&rows)?;
-    let mut held: BTreeMap<usize, StoredFeatures> = BTreeMap::new();
+    let (todo, mut counts) = matcher.reuse(&rows)?;
+    let mut held: BTreeMap<usize, MatchImage> = BTreeMap::new();
     for some in todo.chunks(ROWS_AT_ONCE) {
-        matcher.make(some, &rows, &mut held)?;
+        counts += matcher.make(some, &rows, &mut held)?;
     }
-    let mut pairs = Vec::new();
-    for row in rows.keys() {
-        pairs.extend(read_matches(&std::fs::read(work.store.path(&file(&list, *row)))?)?);
-    }
-    if pairs.is_empty() {
+    if counts.verified == 0 {
         let message =
             format!("none of {tried} pairs of images shows the same place: the images do not overlap, or show too little texture");
         return Err(NoResult(message).into());
     }
-    let note = format!("{} of {tried} pairs verified", pairs.len());
-    let count = |test: fn(&PairConfiguration) -> bool| pairs.iter().filter(|p| test(&p.configuration)).count();
+    let note = format!("{} of {tried} pairs verified", counts.verified);
     let figures = json!({
-        "pairs_tried": tried, "pairs_verified": pairs.len(), "matches": pairs.iter().map(|p| p.matches.len()).sum::<usize>(),
-        "calibrated": count(|c| matches!(c, PairConfiguration::Calibrated { .. })),
-        "uncalibrated": count(|c| matches!(c, PairConfiguration::Uncalibrated { .. })),
-        "planar_or_panoramic": count(|c| matches!(c, PairConfiguration::PlanarOrPanoramic { .. })),
-        "note": note,
+        "pairs_tried": tried, "pairs_verified": counts.verified, "matches": counts.matches, "calibrated": counts.calibrated,
+        "uncalibrated": counts.uncalibrated, "planar_or_panoramic": counts.planar_or_panoramic, "note": note,
     });
     Ok(Outcome { figures, warnings })
+}
+
+/// What the figures say of verified pairs.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    verified: usize,
+    matches: usize,
+    calibrated: usize,
+    uncalibrated: usize,
+    planar_or_panoramic: usize,
+}
+
+impl Counts {
+    fn of(pairs: &[VerifiedPair]) -> Self {
+        let count = |test: fn(&PairConfiguration) -> bool| pairs.iter().filter(|p| test(&p.configuration)).count();
+        Self {
+            verified: pairs.len(),
+            matches: pairs.iter().map(|p| p.matches.len()).sum(),
+            calibrated: count(|c| matches!(c, PairConfiguration::Calibrated { .. })),
+            uncalibrated: count(|c| matches!(c, PairConfiguration::Uncalibrated { .. })),
+            planar_or_panoramic: count(|c| matches!(c, PairConfiguration::PlanarOrPanoramic { .. })),
+        }
+    }
+}
+
+impl AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.verified += other.verified;
+        self.matches += other.matches;
+        self.calibrated += other.calibrated;
+        self.uncalibrated += other.uncalibrated;
+        self.planar_or_panoramic += other.planar_or_panoramic;
+    }
 }
 
 /// For each image the later ones that it is matched with.
@@ -112,17 +138,19 @@ struct Matcher<'a> {
 }
 
 impl Matcher<'_> {
-    /// Rows that have to be made; the others count as done.
-    fn reuse(&self, rows: &BTreeMap<usize, Vec<usize>>) -> Result<Vec<usize>> {
-        let mut todo = Vec::new();
+    /// Rows that have to be made, and what the others hold, which count as done.
+    fn reuse(&self, rows: &BTreeMap<usize, Vec<usize>>) -> Result<(Vec<usize>, Counts)> {
+        let (mut todo, mut counts) = (Vec::new(), Counts::default());
         for (&row, partners) in rows {
-            if self.work.files.reuse(&file(self.list, row), self.key(row, partners)?) {
+            let path = file(self.list, row);
+            if self.work.files.reuse(&path, self.key(row, partners)?) {
+                counts += Counts::of(&read_matches(&std::fs::read(self.work.store.path(&path))?)?);
                 self.work.progress.advance(partners.len());
             } else {
                 todo.push(row);
             }
         }
-        Ok(todo)
+        Ok((todo, counts))
     }
 
     /// What the pairs of a row are made from.
@@ -142,7 +170,7 @@ impl Matcher<'_> {
         Ok(Fingerprint::of_parts(parts.iter().map(|(name, bytes)| (*name, bytes.as_slice()))))
     }
 
-    fn make(&self, some: &[usize], rows: &BTreeMap<usize, Vec<usize>>, held: &mut BTreeMap<usize, StoredFeatures>) -> Result<()> {
+    fn make(&self, some: &[usize], rows: &BTreeMap<usize, Vec<usize>>, held: &mut BTreeMap<usize, MatchImage>) -> Result<Counts> {
         let mut partners: Vec<usize> = some.iter().flat_map(|row| rows[row].iter().copied()).collect();
         partners.sort_unstable();
         partners.dedup();
@@ -154,7 +182,7 @@ impl Matcher<'_> {
             let verified: Vec<Option<VerifiedPair>> = pairs
                 .par_iter()
                 .map(|&(first, second)| {
-                    let pair = self.pair((first, second), (&held[&first], &held[&second]));
+                    let pair = self.pair(&held[&first], &held[&second]);
                     self.work.progress.advance(1);
                     pair
                 })
@@ -165,46 +193,48 @@ impl Matcher<'_> {
                 }
             }
         }
+        let mut counts = Counts::default();
         for (row, pairs) in found {
+            counts += Counts::of(&pairs);
             self.work.files.save(&file(self.list, row), self.key(row, &rows[&row])?, &write_matches(&pairs))?;
         }
-        Ok(())
+        Ok(counts)
     }
 
     /// Loads the features that are needed now, and drops the others.
-    fn hold(&self, rows: &[usize], block: &[usize], held: &mut BTreeMap<usize, StoredFeatures>) -> Result<()> {
+    fn hold(&self, rows: &[usize], block: &[usize], held: &mut BTreeMap<usize, MatchImage>) -> Result<()> {
         held.retain(|image, _| rows.contains(image) || block.binary_search(image).is_ok());
         let mut missing: Vec<usize> = rows.iter().chain(block).copied().filter(|image| !held.contains_key(image)).collect();
         missing.sort_unstable();
         missing.dedup();
-        let loaded: Vec<Result<StoredFeatures>> =
-            missing.par_iter().map(|&image| features::load(self.work, self.list, &self.list.images[image])).collect();
-        for (image, stored) in missing.into_iter().zip(loaded) {
-            held.insert(image, stored?);
+        let load = |&image: &usize| {
+            let entry = &self.list.images[image];
+            let (start, stored) = (&self.starts[entry.camera], features::load(self.work, self.list, entry)?);
+            Ok(MatchImage::new(ImageId::new(image), start.camera.clone(), start.is_known(), stored.features))
+        };
+        let loaded: Vec<Result<MatchImage>> = missing.par_iter().map(load).collect();
+        for (image, made) in missing.into_iter().zip(loaded) {
+            held.insert(image, made?);
         }
         Ok(())
     }
 
-    fn pair(&self, images: (usize, usize), stored: (&StoredFeatures, &StoredFeatures)) -> Option<VerifiedPair> {
+    fn pair(&self, first: &MatchImage, second: &MatchImage) -> Option<VerifiedPair> {
         let config = &self.work.config.matching;
-        let (first, second) = (&stored.0.features, &stored.1.features);
-        let tentative = match self.work.config.features.method {
+        let verify =
+            VerifyOptions { max_error_px: config.max_error_px, min_inliers: config.min_inliers as usize, ..VerifyOptions::default() };
+        let verdict = match self.work.config.features.method {
             FeatureMethod::Sift => {
                 let options = MatchOptions { max_ratio: config.ratio as f32, ..MatchOptions::default() };
-                ::features::match_descriptors(&first.descriptors, &second.descriptors, &options)
+                ::features::match_pair(first, second, &GuidedOptions::default(), &options, &verify)
             }
             FeatureMethod::HarrisNcc => {
                 let options = NccOptions { min_correlation: config.min_correlation, ..NccOptions::default() };
-                ::features::match_guided(first, second, &options)
+                let tentative = ::features::match_guided(first.features(), second.features(), &options);
+                ::features::verify_pair(&first.for_pair(), &second.for_pair(), &tentative, &verify)
             }
         };
-        let side = |image: usize, features| {
-            let start = &self.starts[self.list.images[image].camera];
-            ImageForPair { id: ImageId::new(image), camera: &start.camera, camera_known: start.is_known(), features }
-        };
-        let options =
-            VerifyOptions { max_error_px: config.max_error_px, min_inliers: config.min_inliers as usize, ..VerifyOptions::default() };
-        match ::features::verify_pair(&side(images.0, first), &side(images.1, second), &tentative, &options) {
+        match verdict {
             PairVerdict::Verified(pair) => Some(pair),
             PairVerdict::Rejected { .. } => None,
         }

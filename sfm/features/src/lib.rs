@@ -1,6 +1,7 @@
 //! Features of images: extraction, matching and geometric verification.
 
 mod error;
+mod guided;
 mod harris;
 mod matching;
 pub mod pairs;
@@ -10,6 +11,7 @@ mod sift;
 mod verify;
 
 pub use error::FeatureError;
+pub use guided::{GuidedOptions, MatchImage, match_pair};
 pub use harris::{HarrisOptions, NccOptions, extract_harris, match_guided};
 pub use matching::{MatchOptions, match_descriptors};
 pub use retrieval::{Codebook, GlobalDescriptor, RetrievalOptions};

@@ -28,7 +28,7 @@ impl Default for MatchOptions {
 
 impl MatchOptions {
     /// Whether a neighbour is near enough and clearly nearer than any other.
-    fn accepts(&self, nearest: &Nearest) -> bool {
+    pub(crate) fn accepts(&self, nearest: &Nearest) -> bool {
         let (ratio, limit) = (f64::from(self.max_ratio), f64::from(self.max_distance) * UNIT);
         let distance = f64::from(nearest.distance);
         let clear = nearest.second == u32::MAX || distance < ratio * ratio * f64::from(nearest.second);

@@ -22,3 +22,4 @@ mod tests;
 
 pub(crate) use matcher::nearest;
 pub use matcher::{MatchOptions, match_descriptors};
+pub(crate) use scan::Nearest;

@@ -20,7 +20,7 @@ const NO_KEY: u32 = 1 << 31;
 
 /// The nearest neighbour of one descriptor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Nearest {
+pub(crate) struct Nearest {
     /// Squared distance of the nearest.
     pub distance: u32,
     /// Index of the nearest, the lowest on ties.
@@ -30,7 +30,7 @@ pub(super) struct Nearest {
 }
 
 impl Nearest {
-    const NONE: Self = Self { distance: u32::MAX, index: u32::MAX, second: u32::MAX };
+    pub(crate) const NONE: Self = Self { distance: u32::MAX, index: u32::MAX, second: u32::MAX };
 
     /// Takes in another candidate; ties go to the lower index.
     #[inline(always)]

@@ -21,4 +21,5 @@ mod tests;
 pub use focal::{InteriorEstimate, PairForInterior, interior_from_pairs};
 pub use options::VerifyOptions;
 pub use pair::verify_pair;
+pub(crate) use pair::{Guess, guess, verify_from};
 pub use verdict::{ImageForPair, PairVerdict, Rejection};

@@ -6,10 +6,14 @@ use super::verdict::ImageForPair;
 use nalgebra::{Matrix3, Vector2};
 use scene::{Camera, KeypointIndex};
 use solve::ransac::{Ransac, RansacOptions};
-use solve::relative::{estimate_essential, estimate_fundamental, estimate_homography, sampson_squared};
+use solve::relative::{
+    estimate_essential, estimate_fundamental, estimate_homography, improve_essential, improve_fundamental, sampson_squared,
+    transfer_squared,
+};
 
 type Positions = Vec<Vector2<f64>>;
 type Estimate = fn(&[Vector2<f64>], &[Vector2<f64>], &RansacOptions) -> Option<Ransac<Matrix3<f64>>>;
+type Improve = fn(&Matrix3<f64>, &[Vector2<f64>], &[Vector2<f64>], f64) -> Option<Ransac<Matrix3<f64>>>;
 
 /// Samples that are drawn in any case.
 const MIN_ITERATIONS: usize = 30;
@@ -17,6 +21,8 @@ const MIN_ITERATIONS: usize = 30;
 const FEW: usize = 60;
 /// Samples of the homography: at 0.9999, enough for half of the matches in a plane. It only has to recognise four fifths.
 const HOMOGRAPHY_ITERATIONS: usize = 150;
+/// Matches that it is estimated from, evenly spread: a plane is known to a small part of the largest error from far fewer.
+const HOMOGRAPHY_MATCHES: usize = 300;
 /// Agreement is also looked at for these shares of the largest error: right matches agree better than chance needs.
 const ERROR_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
@@ -47,6 +53,7 @@ pub(super) struct Epipolar {
     /// Matches of a minimal sample, and most models that come from it.
     minimal: (usize, usize),
     estimate: Estimate,
+    improve: Improve,
 }
 
 /// An epipolar geometry.
@@ -67,6 +74,7 @@ impl Epipolar {
             chance: chance(cameras, options.max_error_px),
             minimal: (7, 3),
             estimate: estimate_fundamental,
+            improve: improve_fundamental,
         }
     }
 
@@ -83,6 +91,7 @@ impl Epipolar {
             chance: chance(cameras, options.max_error_px),
             minimal: (5, 10),
             estimate: estimate_essential,
+            improve: improve_essential,
         }
     }
 
@@ -106,6 +115,18 @@ impl Epipolar {
                 best = again;
             }
         }
+        self.judged(best, among, options)
+    }
+
+    /// As [`Epipolar::fit`], from a model of fewer matches of the pair instead of samples.
+    pub(super) fn improved(&self, model: &Matrix3<f64>, among: &[usize], options: &VerifyOptions) -> Result<Fit, usize> {
+        let agreeing = self.extended(*model).inliers;
+        let at = |x: &Positions| -> Positions { agreeing.iter().map(|&i| x[i]).collect() };
+        let found = (self.improve)(model, &at(&self.x1), &at(&self.x2), self.max_error).ok_or(agreeing.len())?;
+        self.judged(self.extended(found.model), among, options)
+    }
+
+    fn judged(&self, best: Fit, among: &[usize], options: &VerifyOptions) -> Result<Fit, usize> {
         let inliers = best.inliers.len();
         let everything = 0..self.x1.len();
         let meaningful = self.means_something(&best.model, among.iter().copied()) || self.means_something(&best.model, everything);
@@ -163,11 +184,11 @@ impl Epipolar {
 
 /// A homography of some matches in pixels, and how many of them agree.
 pub(super) fn homography(pixels: &Pixels, among: &[usize], options: &VerifyOptions, seed: u64) -> Option<(Matrix3<f64>, usize)> {
-    let a: Positions = among.iter().map(|&i| pixels.a[i]).collect();
-    let b: Positions = among.iter().map(|&i| pixels.b[i]).collect();
+    let at = |some: &[usize], x: &Positions| -> Positions { some.iter().map(|&i| x[i]).collect() };
+    let few: Vec<usize> = among.iter().copied().step_by(among.len().div_ceil(HOMOGRAPHY_MATCHES).max(1)).collect();
     let found = estimate_homography(
-        &a,
-        &b,
+        &at(&few, &pixels.a),
+        &at(&few, &pixels.b),
         &RansacOptions {
             max_error: options.max_error_px,
             confidence: options.confidence,
@@ -176,7 +197,9 @@ pub(super) fn homography(pixels: &Pixels, among: &[usize], options: &VerifyOptio
             seed,
         },
     )?;
-    Some((found.model, found.inliers.len()))
+    let limit = options.max_error_px * options.max_error_px;
+    let errors = transfer_squared(&found.model, &at(among, &pixels.a), &at(among, &pixels.b));
+    Some((found.model, errors.iter().filter(|e| **e < limit).count()))
 }
 
 /// Share of the image within the distance of a line: the band as long as the diagonal. A Sampson distance is shared by both images,

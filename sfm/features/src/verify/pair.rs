@@ -6,6 +6,7 @@ use super::models::{Epipolar, Fit, Pixels, homography};
 use super::still::{along_the_border, still};
 use super::verdict::{ImageForPair, PairVerdict, Rejection};
 use crate::random;
+use nalgebra::Matrix3;
 use scene::{KeypointIndex, PairConfiguration, VerifiedPair};
 
 /// Matches that are enough to tell whether a fundamental matrix explains more than an essential one.
@@ -33,17 +34,41 @@ pub fn verify_pair(
     tentative: &[(KeypointIndex, KeypointIndex)],
     options: &VerifyOptions,
 ) -> PairVerdict {
-    let swapped = a.id > b.id;
-    let (a, b) = if swapped { (b, a) } else { (a, b) };
-    let mut matches: Vec<_> = tentative.iter().map(|&(i, j)| if swapped { (j, i) } else { (i, j) }).collect();
-    matches.retain(|&(i, j)| i.index() < a.features.keypoints.len() && j.index() < b.features.keypoints.len());
-    matches.sort_unstable();
-    if matches.len() < options.min_inliers.max(1) {
-        return PairVerdict::Rejected(Rejection::FewMatches { tentative: matches.len() });
+    verify_from(a, b, tentative, None, options)
+}
+
+/// [`verify_pair`] from the geometry of fewer matches of the pair, where there is one, instead of samples.
+pub(crate) fn verify_from(
+    a: &ImageForPair<'_>,
+    b: &ImageForPair<'_>,
+    tentative: &[(KeypointIndex, KeypointIndex)],
+    guess: Option<&Guess>,
+    options: &VerifyOptions,
+) -> PairVerdict {
+    match Pair::new(a, b, tentative, options).and_then(|pair| Ok((pair.decide(guess)?, pair))) {
+        Ok((geometry, pair)) => PairVerdict::Verified(pair.verified(geometry)),
+        Err(rejection) => PairVerdict::Rejected(rejection),
     }
-    let seed = pair_seed(options.seed, a.id.0, b.id.0);
-    let pair = Pair { a, b, pixels: Pixels::new(a, b, &matches), matches, options, seed };
-    pair.verdict()
+}
+
+/// What some of the matches of a pair say of it.
+pub(crate) struct Guess {
+    /// Those that agree, the keypoint of the image with the lower id first.
+    pub matches: Vec<(KeypointIndex, KeypointIndex)>,
+    model: Matrix3<f64>,
+    essential: bool,
+}
+
+/// The geometry that [`verify_pair`] would find; `None` where it rejects the pair.
+pub(crate) fn guess(
+    a: &ImageForPair<'_>,
+    b: &ImageForPair<'_>,
+    tentative: &[(KeypointIndex, KeypointIndex)],
+    options: &VerifyOptions,
+) -> Option<Guess> {
+    let pair = Pair::new(a, b, tentative, options).ok()?;
+    let Geometry { fit, essential } = pair.decide(None).ok()?;
+    Some(Guess { matches: fit.inliers.iter().map(|&i| pair.matches[i]).collect(), model: fit.model, essential })
 }
 
 /// A stream of its own for each pair.
@@ -66,11 +91,30 @@ struct Geometry {
     essential: bool,
 }
 
-impl Pair<'_> {
-    fn verdict(&self) -> PairVerdict {
+impl<'a> Pair<'a> {
+    fn new(
+        a: &'a ImageForPair<'a>,
+        b: &'a ImageForPair<'a>,
+        tentative: &[(KeypointIndex, KeypointIndex)],
+        options: &'a VerifyOptions,
+    ) -> Result<Self, Rejection> {
+        let swapped = a.id > b.id;
+        let (a, b) = if swapped { (b, a) } else { (a, b) };
+        let mut matches: Vec<_> = tentative.iter().map(|&(i, j)| if swapped { (j, i) } else { (i, j) }).collect();
+        matches.retain(|&(i, j)| i.index() < a.features.keypoints.len() && j.index() < b.features.keypoints.len());
+        matches.sort_unstable();
+        if matches.len() < options.min_inliers.max(1) {
+            return Err(Rejection::FewMatches { tentative: matches.len() });
+        }
+        let seed = pair_seed(options.seed, a.id.0, b.id.0);
+        Ok(Self { a, b, pixels: Pixels::new(a, b, &matches), matches, options, seed })
+    }
+
+    /// The geometry of the pair, from that of some of its matches where there is one.
+    fn decide(&self, guess: Option<&Guess>) -> Result<Geometry, Rejection> {
         let all: Vec<usize> = (0..self.matches.len()).collect();
         let cameras = [self.a.camera, self.b.camera];
-        let found = self.geometry(&all);
+        let found = self.geometry(&all, guess);
         let still = still(&self.pixels, cameras, self.options.max_still_px);
         let inliers = found.as_ref().map_or_else(|inliers| *inliers, |g| g.fit.inliers.len());
         let still_inliers = match &found {
@@ -80,20 +124,17 @@ impl Pair<'_> {
         let mut found = found;
         if 2 * still_inliers > inliers {
             let moving: Vec<usize> = all.iter().copied().filter(|i| still.binary_search(i).is_err()).collect();
-            match self.geometry(&moving) {
+            match self.geometry(&moving, None) {
                 // Far points hardly move and agree; the vehicle does not, unless it only translates, where it does no harm.
                 Ok(moved) if 2 * self.count_agreeing(&moved, &still) < still.len() => found = Ok(self.without(moved, &still)),
                 Ok(_) => {}
                 Err(_) if still.len() >= self.options.min_inliers && along_the_border(&still, &self.pixels, self.a.camera) => {
-                    return PairVerdict::Rejected(Rejection::Still { still: still.len(), tentative: all.len() });
+                    return Err(Rejection::Still { still: still.len(), tentative: all.len() });
                 }
                 Err(_) => {}
             }
         }
-        match found {
-            Ok(geometry) => PairVerdict::Verified(self.verified(geometry)),
-            Err(inliers) => PairVerdict::Rejected(Rejection::FewInliers { inliers, tentative: all.len() }),
-        }
+        found.map_err(|inliers| Rejection::FewInliers { inliers, tentative: all.len() })
     }
 
     fn epipolar(&self, essential: bool) -> Epipolar {
@@ -106,15 +147,19 @@ impl Pair<'_> {
     }
 
     /// The epipolar geometry of some matches, or the number of inliers that were too few.
-    fn geometry(&self, some: &[usize]) -> Result<Geometry, usize> {
+    fn geometry(&self, some: &[usize], guess: Option<&Guess>) -> Result<Geometry, usize> {
         let tentative: Vec<_> = some.iter().map(|&i| self.matches[i]).collect();
         let among: Vec<usize> = coherent(self.a.features, self.b.features, &tentative).into_iter().map(|k| some[k]).collect();
         let free = self.epipolar(false);
-        let fundamental = || free.fit(&among, self.options, self.seed).map(|fit| Geometry { fit, essential: false });
+        let fit = |epipolar: &Epipolar, essential: bool| match guess {
+            Some(guess) if guess.essential == essential => epipolar.improved(&guess.model, &among, self.options),
+            _ => epipolar.fit(&among, self.options, self.seed),
+        };
+        let fundamental = || fit(&free, false).map(|fit| Geometry { fit, essential: false });
         if !(self.a.camera_known && self.b.camera_known) {
             return fundamental();
         }
-        match self.epipolar(true).fit(&among, self.options, self.seed) {
+        match fit(&self.epipolar(true), true) {
             Ok(fit) if self.is_calibrated(&fit, &free, &among) => Ok(Geometry { fit, essential: true }),
             Ok(fit) => match fundamental() {
                 Ok(other) if !self.explains_as_much(fit.inliers.len(), other.fit.inliers.len()) => Ok(other),

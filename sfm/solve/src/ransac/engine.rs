@@ -128,19 +128,21 @@ pub fn run<E: Estimator>(
             needed = iterations_needed(options, sampler.success_probability(&inliers, size));
         }
     }
-    let mut previous = Vec::new();
-    for _ in 0..FINAL_ROUNDS {
-        search.inliers(options.max_error, &mut inliers);
-        if inliers == previous || !search.refine_on(&inliers, options.max_error) {
-            break;
-        }
-        std::mem::swap(&mut previous, &mut inliers);
-    }
-    search.inliers(options.max_error, &mut inliers);
-    if inliers.len() < size {
+    search.finish(options.max_error, iterations)
+}
+
+/// Refines a model that came from elsewhere, as [`run`] does with those of its samples: on limited inlier sets with decreasing limits, then on
+/// all inliers. Draws no sample: `iterations` is 0.
+///
+/// `None` for a limit without meaning, and when the model does not have at least `sample_size` inliers.
+pub fn improve<E: Estimator>(estimator: &E, scoring: &impl Scoring, model: E::Model, max_error: f64) -> Option<Ransac<E::Model>> {
+    if !(max_error > 0.0 && max_error.is_finite()) {
         return None;
     }
-    search.best.map(|model| Ransac { model, inliers, iterations })
+    let mut search = Search { estimator, scoring, best: None, best_cost: f64::INFINITY };
+    search.offer(&model);
+    search.optimise_locally(max_error, estimator.sample_size() * LOCAL_SAMPLE_FACTOR);
+    search.finish(max_error, 0)
 }
 
 /// Samples after which one free of outliers was drawn with the wanted confidence.
@@ -206,6 +208,23 @@ impl<E: Estimator, C: Scoring> Search<'_, E, C> {
             self.estimator.squared_errors(model, start, errors);
             out.extend(errors.iter().enumerate().filter(|(_, e)| **e < limit_squared).map(|(i, _)| start + i));
         }
+    }
+
+    /// Refines the best model on all of its inliers.
+    fn finish(mut self, max_error: f64, iterations: usize) -> Option<Ransac<E::Model>> {
+        let (mut inliers, mut previous) = (Vec::new(), Vec::new());
+        for _ in 0..FINAL_ROUNDS {
+            self.inliers(max_error, &mut inliers);
+            if inliers == previous || !self.refine_on(&inliers, max_error) {
+                break;
+            }
+            std::mem::swap(&mut previous, &mut inliers);
+        }
+        self.inliers(max_error, &mut inliers);
+        if inliers.len() < self.estimator.sample_size() {
+            return None;
+        }
+        self.best.map(|model| Ransac { model, inliers, iterations })
     }
 
     fn optimise_locally(&mut self, max_error: f64, limit: usize) {

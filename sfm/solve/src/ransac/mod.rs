@@ -4,7 +4,7 @@
 //! - a [`Sampler`] draws minimal samples: [`UniformSampler`], [`GroupedSampler`];
 //! - a [`Scoring`] turns errors into a cost: [`Msac`], [`InlierCount`].
 //!
-//! [`run`] joins them. Results depend on the input and the seed alone.
+//! [`run`] joins them; [`improve`] starts from a model instead of samples. Results depend on the input and the seed alone.
 
 mod engine;
 mod sampler;
@@ -12,6 +12,6 @@ mod scoring;
 #[cfg(test)]
 mod tests;
 
-pub use engine::{Estimator, Ransac, RansacOptions, run};
+pub use engine::{Estimator, Ransac, RansacOptions, improve, run};
 pub use sampler::{GroupedSampler, Sampler, UniformSampler};
 pub use scoring::{InlierCount, Msac, Scoring};

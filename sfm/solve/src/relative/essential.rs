@@ -5,7 +5,7 @@ use super::matches::Matches;
 use super::pose::{decompose, tangent};
 use super::sampson;
 use crate::numeric::minimise::{COARSE, FINE, levenberg_marquardt};
-use crate::ransac::{Estimator, Msac, Ransac, RansacOptions, UniformSampler, run};
+use crate::ransac::{Estimator, Msac, Ransac, RansacOptions, UniformSampler, improve, run};
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector2, Vector3};
 use scene::Rigid3;
 
@@ -25,11 +25,23 @@ pub fn estimate_essential(x1: &[Vector2<f64>], x2: &[Vector2<f64>], o: &RansacOp
     let sampler = UniformSampler { len: matches.len() };
     let scoring = Msac { max_squared_error: o.max_error * o.max_error };
     let estimator = EssentialEstimator { matches };
-    let mut found = run(&estimator, &sampler, &scoring, o)?;
-    // Exactly on the manifold, even where no refinement was taken.
-    found.model = decompose(&found.model).map(|(rotation, _, t)| Motion { rotation, t }.essential())?;
-    found.inliers.iter_mut().for_each(|i| *i = estimator.matches.source[*i]);
-    Some(found)
+    estimator.stated(run(&estimator, &sampler, &scoring, o)?)
+}
+
+/// A better essential matrix from one that came from elsewhere, such as from fewer matches of the same images: what [`estimate_essential`] does with the
+/// models of its samples, without samples.
+///
+/// `None` when fewer than five finite pairs are within `max_error` of it.
+#[must_use]
+pub fn improve_essential(
+    essential: &Matrix3<f64>,
+    x1: &[Vector2<f64>],
+    x2: &[Vector2<f64>],
+    max_error: f64,
+) -> Option<Ransac<Matrix3<f64>>> {
+    let estimator = EssentialEstimator { matches: Matches::new(x1, x2) };
+    let scoring = Msac { max_squared_error: max_error * max_error };
+    estimator.stated(improve(&estimator, &scoring, *essential, max_error)?)
 }
 
 /// Refines `cam2_from_cam1` on point pairs in normalised coordinates: minimises the sum of the squared Sampson distances,
@@ -91,6 +103,15 @@ impl Motion {
 
 struct EssentialEstimator {
     matches: Matches,
+}
+
+impl EssentialEstimator {
+    /// With the caller's indices, and exactly on the manifold, even where no refinement was taken.
+    fn stated(&self, mut found: Ransac<Matrix3<f64>>) -> Option<Ransac<Matrix3<f64>>> {
+        found.model = decompose(&found.model).map(|(rotation, _, t)| Motion { rotation, t }.essential())?;
+        found.inliers.iter_mut().for_each(|i| *i = self.matches.source[*i]);
+        Some(found)
+    }
 }
 
 impl Estimator for EssentialEstimator {

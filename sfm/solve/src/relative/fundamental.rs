@@ -1,10 +1,10 @@
 //! Robust fundamental matrix.
 
-use super::matches::Matches;
+use super::matches::{Conditioning, Matches};
 use super::sampson;
 use super::seven_point::seven_point;
 use crate::numeric::minimise::{COARSE, levenberg_marquardt};
-use crate::ransac::{Estimator, Msac, Ransac, RansacOptions, UniformSampler, run};
+use crate::ransac::{Estimator, Msac, Ransac, RansacOptions, UniformSampler, improve, run};
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
 
 /// Trials of one refinement.
@@ -25,11 +25,26 @@ pub fn estimate_fundamental(x1: &[Vector2<f64>], x2: &[Vector2<f64>], o: &Ransac
     let options = RansacOptions { max_error: o.max_error * conditioning.scale, ..*o };
     let scoring = Msac { max_squared_error: options.max_error * options.max_error };
     let estimator = FundamentalEstimator { matches };
-    let mut found = run(&estimator, &sampler, &scoring, &options)?;
-    found.inliers.iter_mut().for_each(|i| *i = estimator.matches.source[*i]);
-    let model = conditioning.second().transpose() * found.model * conditioning.first();
-    found.model = model / model.norm();
-    Some(found)
+    Some(estimator.stated(run(&estimator, &sampler, &scoring, &options)?, &conditioning))
+}
+
+/// A better fundamental matrix from one that came from elsewhere, such as from fewer matches of the same images: what [`estimate_fundamental`] does with
+/// the models of its samples, without samples.
+///
+/// `None` when fewer than seven finite pairs are within `max_error` of it, and for points in one place.
+#[must_use]
+pub fn improve_fundamental(
+    fundamental: &Matrix3<f64>,
+    x1: &[Vector2<f64>],
+    x2: &[Vector2<f64>],
+    max_error: f64,
+) -> Option<Ransac<Matrix3<f64>>> {
+    let (matches, conditioning) = Matches::new(x1, x2).conditioned()?;
+    let max_error = max_error * conditioning.scale;
+    let scoring = Msac { max_squared_error: max_error * max_error };
+    let estimator = FundamentalEstimator { matches };
+    let model = conditioning.second().transpose().try_inverse()? * fundamental * conditioning.first().try_inverse()?;
+    Some(estimator.stated(improve(&estimator, &scoring, model / model.norm(), max_error)?, &conditioning))
 }
 
 /// Least-squares fundamental matrix from eight or more pairs, made singular.
@@ -110,6 +125,16 @@ impl Factors {
 
 struct FundamentalEstimator {
     matches: Matches,
+}
+
+impl FundamentalEstimator {
+    /// With the caller's indices and in the caller's coordinates.
+    fn stated(&self, mut found: Ransac<Matrix3<f64>>, conditioning: &Conditioning) -> Ransac<Matrix3<f64>> {
+        found.inliers.iter_mut().for_each(|i| *i = self.matches.source[*i]);
+        let model = conditioning.second().transpose() * found.model * conditioning.first();
+        found.model = model / model.norm();
+        found
+    }
 }
 
 impl Estimator for FundamentalEstimator {

@@ -29,6 +29,14 @@ pub fn estimate_homography(x1: &[Vector2<f64>], x2: &[Vector2<f64>], o: &RansacO
     Some(Ransac { model: model / model.norm(), inliers, iterations: found.iterations })
 }
 
+/// Squared error of each pair under a homography `x2 ~ H x1`, as [`estimate_homography`] measures it; infinite for pairs on the far side of the
+/// horizon, as the sign of H tells. All are infinite for a matrix without inverse; a longer list is cut to the length of the other.
+#[must_use]
+pub fn transfer_squared(h: &Matrix3<f64>, x1: &[Vector2<f64>], x2: &[Vector2<f64>]) -> Vec<f64> {
+    let Some(model) = Both::new(h) else { return vec![f64::INFINITY; x1.len().min(x2.len())] };
+    x1.iter().zip(x2).map(|(a, b)| model.squared_error(a.x, a.y, b.x, b.y)).collect()
+}
+
 /// The homography `x2 ~ H x1` of four pairs, by the direct linear transform (Hartley & Zisserman, 4.1),
 /// in conditioned coordinates of size about 1.
 ///
@@ -78,6 +86,16 @@ impl Both {
         let inverse = h.try_inverse()?;
         inverse.iter().all(|x| x.is_finite()).then_some(Self { h, inverse })
     }
+
+    /// Mean of the squared transfer errors in both images.
+    #[inline]
+    fn squared_error(&self, x1: f64, y1: f64, x2: f64, y2: f64) -> f64 {
+        let (u2, v2, w2) = forward(&self.h, x1, y1);
+        let (u1, v1, w1) = forward(&self.inverse, x2, y2);
+        let (a, b, c, d) = (u2 - x2, v2 - y2, u1 - x1, v1 - y1);
+        let error = 0.5 * (a * a + b * b + c * c + d * d);
+        if w1 > 0.0 && w2 > 0.0 { error } else { f64::INFINITY }
+    }
 }
 
 struct HomographyEstimator {
@@ -104,11 +122,7 @@ impl Estimator for HomographyEstimator {
         let m = &self.matches;
         for (k, e) in out.iter_mut().enumerate() {
             let i = start + k;
-            let (u2, v2, w2) = forward(&model.h, m.x1[i], m.y1[i]);
-            let (u1, v1, w1) = forward(&model.inverse, m.x2[i], m.y2[i]);
-            let (a, b, c, d) = (u2 - m.x2[i], v2 - m.y2[i], u1 - m.x1[i], v1 - m.y1[i]);
-            let error = 0.5 * (a * a + b * b + c * c + d * d);
-            *e = if w1 > 0.0 && w2 > 0.0 { error } else { f64::INFINITY };
+            *e = model.squared_error(m.x1[i], m.y1[i], m.x2[i], m.y2[i]);
         }
     }
 

@@ -16,10 +16,10 @@ mod seven_point;
 #[cfg(test)]
 mod tests;
 
-pub use essential::{estimate_essential, refine_relative_pose};
+pub use essential::{estimate_essential, improve_essential, refine_relative_pose};
 pub use five_point::five_point;
-pub use fundamental::{eight_point, estimate_fundamental};
-pub use homography::{estimate_homography, four_point_homography};
+pub use fundamental::{eight_point, estimate_fundamental, improve_fundamental};
+pub use homography::{estimate_homography, four_point_homography, transfer_squared};
 pub use pose::{RelativePose, essential_from_pose, pose_from_essential};
 pub use sampson::sampson_squared;
 pub use seven_point::seven_point;

@@ -242,3 +242,48 @@ fn sampson_is_the_distance_to_the_nearest_consistent_pair() {
     let squared = sampson_squared(&e, &Vector2::new(0.1, 0.3), &Vector2::new(-0.4, 0.5));
     assert!((squared - 0.02).abs() < 1e-15, "{squared}");
 }
+
+#[test]
+fn a_model_of_a_few_pairs_improves_to_that_of_all() {
+    let to_pixels = |x: &[Vector2<f64>]| -> Vec<Vector2<f64>> { x.iter().map(|p| p * FOCAL_PX + Vector2::new(960.0, 600.0)).collect() };
+    for seed in 0..20 {
+        // 40 % outliers first, then right pairs, of which the model sees the first 25.
+        let v = two_views(&mut Random::new(seed), Scene::Volume, 500, 0.5 / FOCAL_PX, 200);
+        let (few1, few2) = (&v.x1[200..225], &v.x2[200..225]);
+        let limit = 2.0 / FOCAL_PX;
+        let start = estimate_essential(few1, few2, &options(limit)).unwrap();
+        let (found, sampled) =
+            (improve_essential(&start.model, &v.x1, &v.x2, limit).unwrap(), estimate_essential(&v.x1, &v.x2, &options(limit)).unwrap());
+        assert!(essential_defect(&found.model, &[], &[]) < 1e-12 && found.iterations == 0);
+        assert!(found.inliers.len() + 3 >= sampled.inliers.len(), "{} of {}", found.inliers.len(), sampled.inliers.len());
+        assert!(distance_up_to_scale(&found.model, &sampled.model) < 0.01);
+
+        let (p1, p2) = (to_pixels(&v.x1), to_pixels(&v.x2));
+        let start = estimate_fundamental(&p1[200..225], &p2[200..225], &options(2.0)).unwrap();
+        let (found, sampled) =
+            (improve_fundamental(&start.model, &p1, &p2, 2.0).unwrap(), estimate_fundamental(&p1, &p2, &options(2.0)).unwrap());
+        assert!(found.model.determinant().abs() < 1e-12 && (found.model.norm() - 1.0).abs() < 1e-12);
+        assert!(found.inliers.len() + 6 >= sampled.inliers.len(), "{} of {}", found.inliers.len(), sampled.inliers.len());
+    }
+    let v = two_views(&mut Random::new(1), Scene::Volume, 30, 0.0, 0);
+    let truth = essential_from_pose(&v.pose);
+    for limit in [f64::NAN, -1.0, 0.0, f64::INFINITY] {
+        assert!(improve_essential(&truth, &v.x1, &v.x2, limit).is_none() && improve_fundamental(&truth, &v.x1, &v.x2, limit).is_none());
+    }
+    assert!(improve_essential(&Matrix3::from_element(f64::NAN), &v.x1, &v.x2, 0.1).is_none());
+    assert!(improve_essential(&truth, &v.x1[..4], &v.x2[..4], 0.1).is_none());
+}
+
+#[test]
+fn transfer_errors_are_those_of_the_estimate() {
+    let v = two_views(&mut Random::new(2), Scene::Plane, 300, 0.5 / FOCAL_PX, 100);
+    let limit = 3.0 / FOCAL_PX;
+    let found = estimate_homography(&v.x1, &v.x2, &options(limit)).unwrap();
+    let errors = transfer_squared(&found.model, &v.x1, &v.x2);
+    let within: Vec<usize> = (0..300).filter(|&i| errors[i] < limit * limit).collect();
+    assert_eq!(within, found.inliers);
+    // A shift by (3, 4) is off by 5 either way; a singular matrix has no way back.
+    let x = [Vector2::new(1.0, 2.0)];
+    assert!((transfer_squared(&Matrix3::identity(), &x, &[Vector2::new(4.0, 6.0)])[0] - 25.0).abs() < 1e-12);
+    assert_eq!(transfer_squared(&Matrix3::zeros(), &x, &x), [f64::INFINITY]);
+}
