@@ -210,7 +210,7 @@ impl Matcher<'_> {
         let load = |&image: &usize| {
             let entry = &self.list.images[image];
             let (start, stored) = (&self.starts[entry.camera], features::load(self.work, self.list, entry)?);
-            Ok(MatchImage::new(ImageId::new(image), start.camera.clone(), start.is_known(), stored.features))
+            Ok(MatchImage::new(ImageId::new(image), start.camera, start.is_known(), stored.features))
         };
         let loaded: Vec<Result<MatchImage>> = missing.par_iter().map(load).collect();
         for (image, made) in missing.into_iter().zip(loaded) {

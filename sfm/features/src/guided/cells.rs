@@ -1,10 +1,12 @@
 //! Keypoints sorted by where they are.
 
-use scene::{Descriptor, Features};
+use super::distance::squared_norm;
+use nalgebra::Vector2;
+use scene::{Camera, Descriptor, Features};
 use std::ops::Range;
 
 /// Keypoints that a cell holds on average.
-const PER_CELL: f64 = 3.0;
+const PER_CELL: f64 = 2.0;
 /// Smallest side of a cell, pixels.
 const MIN_SIDE_PX: f32 = 4.0;
 
@@ -20,12 +22,16 @@ pub(super) struct Cells {
     pub keypoints: Vec<u32>,
     /// Its descriptor.
     pub descriptors: Vec<Descriptor>,
+    /// The square of its length.
+    pub squared_norms: Vec<i32>,
+    /// Undistorted normalised coordinates, for images of known interior orientation; not numbers where there are none. Else empty.
+    pub rays: [Vec<f32>; 2],
 }
 
 impl Cells {
     /// Keypoints beyond the image, and those without a finite place, come into the nearest cell.
-    pub(super) fn new(features: &Features, size: (u32, u32)) -> Self {
-        let (width, height) = (size.0.max(1) as f32, size.1.max(1) as f32);
+    pub(super) fn new(features: &Features, camera: &Camera, camera_known: bool) -> Self {
+        let (width, height) = (camera.width().max(1) as f32, camera.height().max(1) as f32);
         let count = features.len().max(1) as f64;
         let side_px = ((PER_CELL * f64::from(width) * f64::from(height) / count).sqrt() as f32).max(MIN_SIDE_PX);
         let along = |length: f32| (length / side_px).ceil().max(1.0) as usize;
@@ -40,7 +46,15 @@ impl Cells {
         let mut keypoints: Vec<u32> = (0..features.len() as u32).collect();
         keypoints.sort_by_key(|&k| of[k as usize]);
         let descriptors = keypoints.iter().map(|&k| features.descriptors[k as usize]).collect();
-        Self { side_px, columns, rows, starts, keypoints, descriptors }
+        let squared_norms = keypoints.iter().map(|&k| squared_norm(&features.descriptors[k as usize])).collect();
+        let mut rays = [Vec::new(), Vec::new()];
+        for &k in keypoints.iter().filter(|_| camera_known) {
+            let pixel = &features.keypoints[k as usize];
+            let ray = camera.unproject(&Vector2::new(f64::from(pixel.x), f64::from(pixel.y))).unwrap_or(Vector2::repeat(f64::NAN));
+            rays[0].push(ray.x as f32);
+            rays[1].push(ray.y as f32);
+        }
+        Self { side_px, columns, rows, starts, keypoints, descriptors, squared_norms, rays }
     }
 
     /// The cells that hold keypoints: column, row, positions in the lists.

@@ -19,7 +19,7 @@ impl MatchImage {
     /// strongest first, as [`extract`](crate::extract) gives them.
     #[must_use]
     pub fn new(id: ImageId, camera: Camera, camera_known: bool, features: Features) -> Self {
-        let cells = Cells::new(&features, (camera.width(), camera.height()));
+        let cells = Cells::new(&features, &camera, camera_known);
         Self { id, camera, camera_known, features, cells }
     }
 

@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2, Vector3};
 /// Matches about a place that say where it lies.
 const NEIGHBOURS: usize = 6;
 /// A window is wider than what its neighbours span by this many pixels to each side,
-const MARGIN_PX: f64 = 12.0;
+const MARGIN_PX: f64 = 8.0;
 /// by this share of what they span,
 const MARGIN_SPAN: f64 = 0.25;
 /// and by this share of the distance to the nearest of them.

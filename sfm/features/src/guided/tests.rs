@@ -2,16 +2,22 @@
 
 use super::cells::Cells;
 use super::motion::Motion;
-use super::search::search;
+use super::search::{Band, Where, search};
 use super::{GuidedOptions, MatchImage, distance, match_pair};
 use crate::matching::{MatchOptions, Nearest, match_descriptors};
 use crate::verify::{PairVerdict, VerifyOptions, verify_pair};
 use nalgebra::{Rotation3, UnitQuaternion, Vector2, Vector3};
 use scene::{Camera, CameraModel, Descriptor, Features, ImageId, Keypoint, Rigid3, VerifiedPair};
+use solve::relative::essential_from_pose;
 use std::f32::consts::TAU;
 use synthetic::Random;
 
 const SIZE: (u32, u32) = (1360, 1024);
+
+fn pose(roll: f64) -> Rigid3 {
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_euler_angles(0.05, -0.1, roll));
+    Rigid3::new(rotation, Vector3::new(0.5, 0.1, 0.1))
+}
 
 fn camera() -> Camera {
     Camera::from_focal(CameraModel::Pinhole, SIZE.0, SIZE.1, 1000.0).expect("a valid camera")
@@ -42,8 +48,7 @@ struct Planted {
 impl Planted {
     fn new(seed: u64, roll: f64, n: usize, clutter: usize) -> Self {
         let mut random = Random::new(seed);
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_euler_angles(0.05, -0.1, roll));
-        let (pose, camera) = (Rigid3::new(rotation, Vector3::new(0.5, 0.1, 0.1)), camera());
+        let (pose, camera) = (pose(roll), camera());
         let mut planted = Self { features: [Features::default(), Features::default()] };
         while planted.features[0].len() < n {
             let (x, y) = (random.range(-0.65, 0.65), random.range(-0.5, 0.5));
@@ -163,16 +168,34 @@ fn bad_keypoints_are_no_panic() {
 #[test]
 fn a_search_finds_the_nearest_of_each_window() {
     let planted = Planted::new(9, 0.3, 300, 300);
-    let [a, b] = [0, 1].map(|i| Cells::new(&planted.features[i], SIZE));
+    let [a, b] = [0, 1].map(|i| Cells::new(&planted.features[i], &camera(), true));
     let place = |f: &Features, k: usize| Vector2::new(f64::from(f.keypoints[k].x), f64::from(f.keypoints[k].y));
     let some = |i: usize| -> Vec<Vector2<f64>> { (0..60).map(|k| place(&planted.features[i], k)).collect() };
-    let motion = Motion::new(some(0), &some(1));
+    let motion = || Motion::new(some(0), &some(1));
+    let essential = essential_from_pose(&pose(0.3));
+    for width in [None, Some(0.02)] {
+        let band = width.map(|width| Band { essential, width });
+        check_search(&planted, &a, &b, &Where { motion: motion(), band });
+    }
+}
+
+/// Against the definition.
+fn check_search(planted: &Planted, a: &Cells, b: &Cells, searched: &Where) {
+    let place = |f: &Features, k: usize| Vector2::new(f64::from(f.keypoints[k].x), f64::from(f.keypoints[k].y));
+    let in_band = |i: usize, j: usize| {
+        let [x, y] = [(0, i), (1, j)].map(|(f, k)| camera().unproject(&place(&planted.features[f], k)).expect("in a pinhole image"));
+        let distance = |band: &Band| {
+            let line = band.essential * x.push(1.0);
+            (line.dot(&y.push(1.0)) / line.xy().norm()).abs()
+        };
+        searched.band.as_ref().is_none_or(|band| distance(band) <= band.width)
+    };
     // The definition: every keypoint of a cell with every keypoint of the cells that its window touches.
     let (mut of_a, mut of_b) = (vec![Vec::new(); a.keypoints.len()], vec![Vec::new(); b.keypoints.len()]);
     let mut compared = 0;
     for (column, row, members) in a.occupied() {
         let side = f64::from(a.side_px);
-        let window = motion.window(Vector2::new(column as f64 * side, row as f64 * side), side);
+        let window = searched.motion.window(Vector2::new(column as f64 * side, row as f64 * side), side);
         for member in members {
             let i = a.keypoints[member] as usize;
             let at = place(&planted.features[0], i) / side;
@@ -180,7 +203,7 @@ fn a_search_finds_the_nearest_of_each_window() {
             for j in 0..b.keypoints.len() {
                 let at = place(&planted.features[1], j);
                 let cell = |v: f64| (v / f64::from(b.side_px)).floor();
-                if (0..2).all(|k| cell(window.low[k]).max(0.0) <= cell(at[k]) && cell(at[k]) <= cell(window.high[k])) {
+                if in_band(i, j) && (0..2).all(|k| cell(window.low[k]).max(0.0) <= cell(at[k]) && cell(at[k]) <= cell(window.high[k])) {
                     let (x, y) = (&planted.features[0].descriptors[i], &planted.features[1].descriptors[j]);
                     let d: u32 = x.iter().zip(y).map(|(&x, &y)| u32::from(x.abs_diff(y)).pow(2)).sum();
                     of_a[i].push((d, j as u32));
@@ -197,8 +220,8 @@ fn a_search_finds_the_nearest_of_each_window() {
         Nearest { distance: first.0, index: first.1, second: all.get(1).map_or(u32::MAX, |s| s.0) }
     };
     let expected: [Vec<Nearest>; 2] = [of_a, of_b].map(|all| all.into_iter().map(two).collect());
-    for distances in [distance::portable, distance::best()] {
-        let found = search(&a, &b, &motion, distances);
+    for products in [distance::portable, distance::best()] {
+        let found = search(a, b, searched, products);
         assert!(found.of_a == expected[0] && found.of_b == expected[1]);
     }
 }

@@ -20,9 +20,9 @@ const MIN_ITERATIONS: usize = 30;
 /// Inliers beyond which a pair needs no count of the fewest that mean something.
 const FEW: usize = 60;
 /// Samples of the homography: at 0.9999, enough for half of the matches in a plane. It only has to recognise four fifths.
-const HOMOGRAPHY_ITERATIONS: usize = 150;
+const HOMOGRAPHY_ITERATIONS: usize = 100;
 /// Matches that it is estimated from, evenly spread: a plane is known to a small part of the largest error from far fewer.
-const HOMOGRAPHY_MATCHES: usize = 300;
+const HOMOGRAPHY_MATCHES: usize = 200;
 /// Agreement is also looked at for these shares of the largest error: right matches agree better than chance needs.
 const ERROR_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 

@@ -59,6 +59,13 @@ pub(crate) struct Guess {
     essential: bool,
 }
 
+impl Guess {
+    /// The essential matrix, where it is one that describes the pair.
+    pub(crate) fn essential(&self) -> Option<Matrix3<f64>> {
+        self.essential.then_some(self.model)
+    }
+}
+
 /// The geometry that [`verify_pair`] would find; `None` where it rejects the pair.
 pub(crate) fn guess(
     a: &ImageForPair<'_>,
