@@ -16,7 +16,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("masking", &["scene", "imaging", "models"]),
     ("mapping", &["scene", "solve"]),
     ("dense", &["scene", "imaging"]),
-    ("pipeline", &["scene", "imaging", "solve", "eval", "synthetic", "features", "calibrate", "models", "masking", "mapping", "dense"]),
+    ("surface", &["scene"]),
+    ("pipeline", &["scene", "imaging", "solve", "eval", "synthetic", "features", "calibrate", "models", "masking", "mapping", "dense", "surface"]),
 ];
 
 #[test]
