@@ -17,7 +17,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapping", &["scene", "solve"]),
     ("dense", &["scene", "imaging"]),
     ("surface", &["scene"]),
-    ("pipeline", &["scene", "imaging", "solve", "eval", "synthetic", "features", "calibrate", "models", "masking", "mapping", "dense", "surface"]),
+    (
+        "pipeline",
+        &["scene", "imaging", "solve", "eval", "synthetic", "features", "calibrate", "models", "masking", "mapping", "dense", "surface"],
+    ),
 ];
 
 #[test]

@@ -44,7 +44,8 @@ pub fn report(config: &Config, done: &BTreeMap<&'static str, Stamp>) -> Value {
         "world": figure("orient", "world"),
         "control_points": figure("orient", "control_points"),
         "dense": part("densify", &dense),
-        "evaluation": evaluation(done.get("evaluate").map(|s| &s.figures)),
+        "surface": stage_figures(done.get("surface").map(|s| &s.figures)),
+        "evaluation": stage_figures(done.get("evaluate").map(|s| &s.figures)),
         "warnings": warnings,
     })
 }
@@ -63,7 +64,7 @@ fn cameras(ingested: Value, oriented: &Value) -> Value {
 }
 
 /// The figures without the line for people.
-fn evaluation(figures: Option<&Value>) -> Value {
+fn stage_figures(figures: Option<&Value>) -> Value {
     let Some(Value::Object(figures)) = figures else { return Value::Null };
     figures.iter().filter(|(key, _)| *key != "note").map(|(k, v)| (k.clone(), v.clone())).collect::<Map<_, _>>().into()
 }

@@ -25,4 +25,5 @@ pub mod sensor_log;
 pub mod stage;
 pub mod stages;
 pub mod store;
+pub mod surfacing;
 pub mod synth;

@@ -1,7 +1,7 @@
 //! The way from photographs to measurements, station by station.
 
 use crate::stage::Stage;
-use crate::stages::{densify, evaluate, features, ingest, mask, matching, orient, report};
+use crate::stages::{densify, evaluate, features, ingest, mask, matching, orient, report, surface};
 
 /// The stations, in order. Each says what it builds on; `sfm status` shows where a dive stands.
 pub const RECIPE: &[&Stage] = &[
@@ -17,7 +17,9 @@ pub const RECIPE: &[&Stage] = &[
     &orient::STAGE,
     // How far away is what each pixel shows, and what do all images together say of the surface?
     &densify::STAGE,
-    // How far is that from the truth, where a truth is known?
+    // Which surface goes through it, how large and how rough is it, what volume lies under it?
+    &surface::STAGE,
+    // How far is the cloud from the truth, where a truth is known?
     &evaluate::STAGE,
     // All figures, in one file for programs and one page for people.
     &report::STAGE,

@@ -63,7 +63,7 @@ fn a_rendered_dive_comes_out_as_it_is() {
     let true_centre = truth.cam_from_world(scene::ImageId::new(true_image)).unwrap().centre();
     assert!((model.cam_from_world(image).unwrap().centre() - true_centre).norm() < 0.1);
     assert!(number("/dense/points") > 1000.0);
-    for stage in ["ingest", "mask", "features", "matching", "orient", "densify", "evaluate", "report"] {
+    for stage in ["ingest", "mask", "features", "matching", "orient", "densify", "surface", "evaluate", "report"] {
         assert!(number(&format!("/stages/{stage}/seconds")) >= 0.0);
     }
 
@@ -132,7 +132,7 @@ fn a_rendered_dive_comes_out_as_it_is() {
     let text = std::fs::read_to_string(dive.path("dive.toml")).unwrap();
     dive.write("dive.toml", &text.replace("quality = \"low\"", "quality = \"medium\""));
     let changed = stages(dive.ok(&["status"]));
-    assert_eq!(&changed[4..], ["orient done", "densify stale", "evaluate stale", "report stale"]);
+    assert_eq!(&changed[4..], ["orient done", "densify stale", "surface stale", "evaluate stale", "report stale"]);
 }
 
 /// The second feature method goes the whole way to oriented images, and loops are looked for with its descriptors.

@@ -39,6 +39,8 @@ pub enum Command {
     Label(LabelArgs),
     /// Train the classifier of masks with labelled images.
     Train(TrainArgs),
+    /// Make the surface through a cloud with normals, and measure it.
+    Surface(SurfaceArgs),
     /// Measure a cloud against a reference in the same frame.
     Eval(EvalArgs),
     /// Adjust a model that another program made with the rig, lengths, sensors and control points of a dive.toml.
@@ -253,6 +255,40 @@ pub struct TrainArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print the figures as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sfm surface`.
+#[derive(Debug, Args)]
+pub struct SurfaceArgs {
+    /// The cloud: PLY with normals.
+    pub cloud: PathBuf,
+    /// The mesh to write: .ply, .obj or .glb.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Halve the cube around the points so many times [default: 8].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=14), conflicts_with = "cell")]
+    pub depth: Option<u32>,
+    /// Edge of the finest cells, in the unit of the cloud; twice the GSD is as fine as a dense cloud carries.
+    #[arg(long, value_name = "LENGTH")]
+    pub cell: Option<f64>,
+    /// Cut off the surface where the points are sparser than this share of their median density; 0: nowhere.
+    #[arg(long, value_name = "SHARE", default_value_t = crate::surfacing::TRIM)]
+    pub trim: f64,
+    /// Weight of the points against their normals: less is smoother.
+    #[arg(long, value_name = "WEIGHT")]
+    pub screening: Option<f64>,
+    /// Let points weigh by the inverse of their variance (property sigma).
+    #[arg(long)]
+    pub sigma_weights: bool,
+    /// The points are those of a closed body: close all holes. Not for a sea floor; best with --trim 0.
+    #[arg(long)]
+    pub closed: bool,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print the figures as JSON, with the keys of report.json below `surface`.
     #[arg(long)]
     pub json: bool,
 }

@@ -1,7 +1,7 @@
 //! From the command line to an exit code.
 
 use super::args::{Cli, Command};
-use super::{bundle, eval, export, help, init, label, mask, orient, run, status, synth, train};
+use super::{bundle, eval, export, help, init, label, mask, orient, run, status, surface, synth, train};
 use crate::config::ConfigError;
 use crate::error::{Misfit, NoResult};
 use crate::synth::SynthError;
@@ -28,6 +28,7 @@ pub fn main() -> ExitCode {
         Command::Mask(args) => mask::mask(args),
         Command::Label(args) => label::label(args),
         Command::Train(args) => train::run(args),
+        Command::Surface(args) => surface::surface(args),
         Command::Eval(args) => eval::eval(args),
         Command::Bundle(args) => bundle::bundle(args),
         Command::Orient(args) => orient::orient(args),

@@ -15,6 +15,7 @@ mod orient;
 mod run;
 mod status;
 mod summary;
+mod surface;
 mod synth;
 mod terminal;
 mod train;

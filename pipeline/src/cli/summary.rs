@@ -7,6 +7,7 @@ use std::path::Path;
 /// Files worth opening: the stage that makes them, and what they are.
 const FILES: &[(&str, &str, &str)] = &[
     ("report", "report.html", "figures, the scene in 3D, images with keypoints and masks"),
+    ("surface", "surface/mesh.ply", "surface"),
     ("densify", "dense/cloud.ply", "dense cloud"),
     ("orient", "sparse/points.ply", "sparse points; the cameras lie beside them as a COLMAP model"),
     ("report", "report.json", "every figure; `sfm help json` explains them"),

@@ -1,6 +1,8 @@
 //! The configuration as resolved: every default filled in, every value checked.
 
-use super::stage_options::{DensifyConfig, EvaluateConfig, FeaturesConfig, MaskConfig, MatchingConfig, OrientConfig, ReportConfig};
+use super::stage_options::{
+    DensifyConfig, EvaluateConfig, FeaturesConfig, MaskConfig, MatchingConfig, OrientConfig, ReportConfig, SurfaceConfig,
+};
 use nalgebra::UnitQuaternion;
 use scene::{CameraModel, FlatPort, Rigid3};
 use serde::Serialize;
@@ -39,6 +41,8 @@ pub struct Config {
     pub orient: OrientConfig,
     /// Options of the stage `densify`.
     pub densify: DensifyConfig,
+    /// Options of the stage `surface`.
+    pub surface: SurfaceConfig,
     /// Options of the stage `evaluate`.
     pub evaluate: EvaluateConfig,
     /// Options of the stage `report`.

@@ -22,6 +22,7 @@ pub(super) struct RawConfig {
     pub(super) matching: RawMatching,
     pub(super) orient: RawOrient,
     pub(super) densify: RawDensify,
+    pub(super) surface: RawSurface,
     pub(super) evaluate: RawEvaluate,
     pub(super) report: RawReport,
 }
@@ -248,6 +249,17 @@ pub(super) struct RawDensify {
     pub(super) max_views: Place<u32>,
     pub(super) min_views: Place<u32>,
     pub(super) seed: Place<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawSurface {
+    pub(super) cell_m: Place<f64>,
+    pub(super) trim: Place<f64>,
+    pub(super) screening: Place<f64>,
+    pub(super) samples_per_cell: Place<f64>,
+    pub(super) sigma_weights: Place<bool>,
+    pub(super) closed: Place<bool>,
 }
 
 #[derive(Debug, Default, Deserialize)]

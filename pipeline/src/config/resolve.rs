@@ -111,6 +111,7 @@ fn resolve(source: &mut Source<'_>, raw: &RawConfig, file: &Path) -> Config {
         matching: stages::matching(source, &raw.matching),
         orient: stages::orient(source, &raw.orient),
         densify: stages::densify(source, &raw.densify),
+        surface: stages::surface(source, &raw.surface),
         evaluate: stages::evaluate(source, &raw.evaluate, folder),
         report: stages::report(source, &raw.report),
         cameras,

@@ -320,6 +320,23 @@ pub struct DensifyConfig {
     pub seed: u32,
 }
 
+/// Options of the stage `surface`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SurfaceConfig {
+    /// Edge of the finest cells, metres (the unit of the model); `None`: twice the ground sample distance.
+    pub cell_m: Option<f64>,
+    /// Share of the median density of points below which the surface is cut off.
+    pub trim: f64,
+    /// Weight of the points against their normals.
+    pub screening: f64,
+    /// Points that a cell holds at least.
+    pub samples_per_cell: f64,
+    /// Whether points weigh by their standard deviation.
+    pub sigma_weights: bool,
+    /// Whether the points are those of a closed body.
+    pub closed: bool,
+}
+
 /// Options of the stage `evaluate`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EvaluateConfig {

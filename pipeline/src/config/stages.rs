@@ -3,10 +3,11 @@
 use super::error::Source;
 use super::model::CameraConfig;
 use super::path_text::PathText;
-use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport};
+use super::raw::{RawDensify, RawEvaluate, RawFeatures, RawMask, RawMatching, RawOrient, RawReport, RawSurface};
 use super::stage_options::{
     AreaConfig, Combine, DenseQuality, DensifyConfig, EvaluateConfig, FeatureMethod, FeaturesConfig, IpConfig, Mapper, MaskConfig,
     MaskStrategy, MatchingConfig, MlConfig, MovingConfig, OrientConfig, OtsuOf, PairRule, Polarity, Preprocessing, ReportConfig, Route,
+    SurfaceConfig,
 };
 use super::values::Values;
 use std::path::{Path, PathBuf};
@@ -203,6 +204,20 @@ pub(super) fn densify(source: &mut Source<'_>, raw: &RawDensify) -> DensifyConfi
         max_views: values.count("densify.max_views", &raw.max_views, 1, 16, views.max_views as u32),
         min_views: values.count("densify.min_views", &raw.min_views, 2, 16, fusion.min_views as u32),
         seed: values.count("densify.seed", &raw.seed, 0, u32::MAX, dense::DepthOptions::default().seed as u32),
+    }
+}
+
+pub(super) fn surface(source: &mut Source<'_>, raw: &RawSurface) -> SurfaceConfig {
+    let mut values = Values { source };
+    let options = surface::PoissonOptions::default();
+    let yes = |value: &super::raw::Place<bool>, default: bool| value.as_ref().map_or(default, |v| *v.get_ref());
+    SurfaceConfig {
+        cell_m: values.positive("surface.cell_m", &raw.cell_m),
+        trim: values.within("surface.trim", &raw.trim, 0.0, 1.0, crate::surfacing::TRIM),
+        screening: values.within("surface.screening", &raw.screening, 0.0, 1e4, options.screening),
+        samples_per_cell: values.within("surface.samples_per_cell", &raw.samples_per_cell, 0.1, 1000.0, options.samples_per_cell),
+        sigma_weights: yes(&raw.sigma_weights, options.sigma_weights),
+        closed: yes(&raw.closed, options.closed),
     }
 }
 

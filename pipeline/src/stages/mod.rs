@@ -18,5 +18,6 @@ mod page;
 mod pairing;
 pub mod report;
 mod single_masks;
+pub mod surface;
 mod targets;
 mod world;

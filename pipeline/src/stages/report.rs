@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 pub const STAGE: Stage = Stage {
     name: "report",
     version: 1,
-    upstream: &["ingest", "mask", "features", "matching", "orient", "densify", "evaluate"],
+    upstream: &["ingest", "mask", "features", "matching", "orient", "densify", "surface", "evaluate"],
     options,
     inputs: no_inputs,
     work,

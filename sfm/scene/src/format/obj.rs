@@ -1,10 +1,10 @@
-//! Wavefront OBJ: the geometry alone.
+//! Wavefront OBJ: geometry, and colours of the vertices.
 
 use super::FormatError;
 use super::ply::{Dropped, drop_not_finite};
 use crate::Mesh;
 use nalgebra::Point3;
-use std::io::BufRead;
+use std::io::{BufRead, Write};
 
 /// Reads the vertices (`v x y z`, with `r g b` from 0 to 1 where every vertex has them) and faces (`f`, corners as `v`,
 /// `v/vt`, `v//vn` or `v/vt/vn`, counted from 1 or, negative, from the last vertex back) of an OBJ file; all other lines
@@ -64,6 +64,30 @@ pub fn read_obj_mesh(mut input: impl BufRead) -> Result<(Mesh, Dropped), FormatE
     Ok((mesh, dropped))
 }
 
+/// Writes a mesh as OBJ: `v x y z`, with `r g b` from 0 to 1 where it has colours, and `f` counted from 1. Numbers have as many digits as
+/// bring back the same value.
+///
+/// # Errors
+/// [`FormatError::NotRepresentable`] where there is not one colour a vertex; [`FormatError::Stream`] where writing fails.
+pub fn write_obj_mesh(mesh: &Mesh, mut out: impl Write) -> Result<(), FormatError> {
+    if !mesh.colours.is_empty() && mesh.colours.len() != mesh.vertices.len() {
+        let what = format!("{} colours for {} vertices", mesh.colours.len(), mesh.vertices.len());
+        return Err(FormatError::NotRepresentable { format: "OBJ", what });
+    }
+    for (i, v) in mesh.vertices.iter().enumerate() {
+        write!(out, "v {} {} {}", v.x, v.y, v.z)?;
+        if let Some(colour) = mesh.colours.get(i) {
+            let [r, g, b] = colour.map(|c| f64::from(c) / 255.0);
+            write!(out, " {r:.4} {g:.4} {b:.4}")?;
+        }
+        writeln!(out)?;
+    }
+    for [a, b, c] in &mesh.faces {
+        writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1)?;
+    }
+    Ok(out.flush()?)
+}
+
 /// Index from 0 of a face's corner. Vertices may follow the faces that use them.
 fn corner(word: &str, vertices: usize) -> Result<i64, String> {
     let number = word.split('/').next().unwrap_or_default();
@@ -96,6 +120,15 @@ mod tests {
         assert_eq!(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 3]]);
         assert_eq!(mesh.vertices[2], Point3::new(1.0, 1.0, 0.0));
         assert_eq!(dropped, Dropped { points: 0, faces: 1 });
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let vertices = vec![Point3::new(1e6 / 3.0, -0.1, 1e-9), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+        let mesh = Mesh { vertices, faces: vec![[0, 1, 2]], colours: vec![[0, 127, 255], [3, 2, 1], [254, 253, 252]] };
+        let mut bytes = Vec::new();
+        write_obj_mesh(&mesh, &mut bytes).expect("written");
+        assert_eq!(read_obj_mesh(bytes.as_slice()).expect("valid").0, mesh);
     }
 
     #[test]
