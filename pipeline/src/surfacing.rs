@@ -4,14 +4,16 @@ use anyhow::Result;
 use scene::{Cloud, Mesh};
 use serde_json::{Value, json};
 use surface::{
-    PoissonOptions, SurfaceError, closed_volume, holes, profile_rugosity, reconstruct, rim_plane, rugosity, surface_area, trim,
-    volume_over_plane,
+    Footprint, PoissonOptions, SurfaceError, closed_volume, holes, profile_rugosity, reconstruct, rim_plane, rugosity, standing_volume,
+    surface_area, trim,
 };
 
 /// Share of the median density below which the surface is cut off, where none is given.
 pub const TRIM: f64 = 0.25;
 /// Pieces below this share of the area are left out.
 const MIN_ISLAND: f64 = 0.001;
+/// Edge of the cells of the footprint, cells of the octree.
+const FOOTPRINT_CELLS: f64 = 2.0;
 /// Profiles along each of two directions.
 const PROFILES: usize = 20;
 
@@ -21,7 +23,8 @@ const PROFILES: usize = 20;
 /// [`SurfaceError`] where there is no surface to make.
 pub fn make(cloud: &Cloud, options: &PoissonOptions, trim_share: f64) -> Result<(Mesh, Value), SurfaceError> {
     let made = reconstruct(cloud, options)?;
-    let (mesh, _, cut) = trim(&made.mesh, &made.density, trim_share * made.median_density, MIN_ISLAND)?;
+    let threshold = trim_share * made.median_density;
+    let (mesh, _, cut) = trim(&made.mesh, &made.density, threshold, MIN_ISLAND)?;
     let found = holes(&mesh)?;
     let plane = match rim_plane(&mesh) {
         Ok(plane) => Some(plane),
@@ -30,7 +33,11 @@ pub fn make(cloud: &Cloud, options: &PoissonOptions, trim_share: f64) -> Result<
     };
     // A closed surface has no rim; of an open one the longest loop is no hole.
     let inner = found.loops.get(1..).unwrap_or_default();
-    let over_plane = plane.as_ref().map(|plane| volume_over_plane(&mesh, plane)).transpose()?;
+    let standing = |plane| {
+        let footprint = Footprint::new(&mesh, plane, FOOTPRINT_CELLS * made.summary.cell)?;
+        standing_volume(&made.mesh, &made.density, threshold, plane, &footprint)
+    };
+    let over_plane = plane.as_ref().map(standing).transpose()?;
     let figures = json!({
         "points": made.summary.points,
         "depth": made.summary.depth,

@@ -69,6 +69,7 @@ fn table(figures: &Value) -> String {
         ("volume above the fitted plane", "/over_plane/above", 6),
         ("volume below it", "/over_plane/below", 6),
         ("footprint", "/over_plane/footprint", 5),
+        ("supported by points, share", "/over_plane/supported", 4),
         ("rugosity, area by footprint", "/rugosity", 4),
         ("rugosity, chain by tape, mean", "/profiles/mean", 4),
     ];

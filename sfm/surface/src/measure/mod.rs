@@ -1,10 +1,12 @@
 //! What is measured on a mesh.
 
+mod footprint;
 mod holes;
 mod plane;
 mod rugosity;
 mod volume;
 
+pub use footprint::{Footprint, StandingVolume, standing_volume};
 pub use holes::{Hole, Holes, holes};
 pub use plane::{Plane, fit_plane, rim_plane};
 pub use rugosity::{ProfileRugosity, Rugosity, profile_rugosity, rugosity};

@@ -2,6 +2,7 @@
 
 use super::{Plane, check, corners, holes, vector_area};
 use crate::SurfaceError;
+use nalgebra::Point3;
 use scene::Mesh;
 use serde::Serialize;
 
@@ -35,7 +36,7 @@ pub fn closed_volume(mesh: &Mesh) -> Result<f64, SurfaceError> {
 }
 
 /// Volume between a mesh and a plane.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PlaneVolume {
     /// Where the mesh lies above the plane.
     pub above: f64,
@@ -55,16 +56,20 @@ pub struct PlaneVolume {
 /// [`SurfaceError::EmptyMesh`], [`SurfaceError::BadFace`].
 pub fn volume_over_plane(mesh: &Mesh, plane: &Plane) -> Result<PlaneVolume, SurfaceError> {
     check(mesh)?;
-    let mut out = PlaneVolume { above: 0.0, below: 0.0, footprint: 0.0 };
+    let mut out = PlaneVolume::default();
     for face in &mesh.faces {
-        let corners = corners(mesh, face);
-        let area = vector_area(&corners).dot(&plane.normal);
-        let heights = corners.map(|p| plane.height(&p));
-        out.footprint += area;
-        out.above += area * positive(heights);
-        out.below += area * positive(heights.map(|h| -h));
+        prism(&corners(mesh, face), plane, &mut out);
     }
     Ok(out)
+}
+
+/// Adds what is between a face and the plane.
+pub(super) fn prism(corners: &[Point3<f64>; 3], plane: &Plane, volume: &mut PlaneVolume) {
+    let area = vector_area(corners).dot(&plane.normal);
+    let heights = corners.map(|p| plane.height(&p));
+    volume.footprint += area;
+    volume.above += area * positive(heights);
+    volume.below += area * positive(heights.map(|h| -h));
 }
 
 /// Mean over a triangle of the positive part of a linear function with these values in its corners.
