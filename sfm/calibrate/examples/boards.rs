@@ -4,6 +4,7 @@
 use calibrate::{BoardFinding, CameraSetup, Setup, View, calibrate, detect_board};
 use nalgebra::Vector3;
 use scene::CameraModel;
+use scene::camera::MAX_CAMERA_PARAMS;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -18,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let image = imaging::decode_grey(&std::fs::read(file)?)?;
             let (width, height) = (image.width() as u32, image.height() as u32);
             if exposure == 0 {
-                cameras.push(CameraSetup { width, height, model: CameraModel::OpenCv });
+                cameras.push(CameraSetup { width, height, model: CameraModel::OpenCv, held: [false; MAX_CAMERA_PARAMS] });
             }
             match detect_board(&image, columns, rows) {
                 BoardFinding::Found(board) => {

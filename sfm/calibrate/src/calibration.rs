@@ -2,7 +2,7 @@
 
 use crate::error::CalibrateError;
 use crate::start::{Start, start};
-use nalgebra::{DMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix6, Vector2, Vector3};
 use scene::camera::{MAX_CAMERA_PARAMS, ParamKind};
 use scene::{Camera, CameraModel, Rigid3};
 use solve::adjust::{
@@ -26,6 +26,8 @@ pub struct CameraSetup {
     pub height: u32,
     /// How it is described.
     pub model: CameraModel,
+    /// Whether each parameter of the model keeps its start value: of distortion 0, of the principal point the middle.
+    pub held: [bool; MAX_CAMERA_PARAMS],
 }
 
 /// The target as one photograph shows it.
@@ -57,9 +59,9 @@ pub struct Parameter {
     pub name: &'static str,
     /// Its value, pixels or none.
     pub value: f64,
-    /// Its standard deviation.
+    /// Its standard deviation; 0 for one that is held.
     pub sigma: f64,
-    /// Of distortion parameters: whether it differs from 0 at 99 %.
+    /// Of distortion parameters that are not held: whether it differs from 0 at 99 %.
     pub significant: Option<bool>,
 }
 
@@ -70,12 +72,16 @@ pub struct CalibratedCamera {
     pub camera: Camera,
     /// Its parameters with their precision.
     pub parameters: Vec<Parameter>,
-    /// Their correlations, in the same order.
+    /// Their correlations, in the same order; 0 with one that is held.
     pub correlations: DMatrix<f64>,
+    /// Their covariance, in the same order; 0 with one that is held.
+    pub covariance: DMatrix<f64>,
     /// `cam_from_rig`.
     pub cam_from_rig: Rigid3,
     /// Standard deviations of the rotation about the axes of the camera, radians, and of the translation, metres; 0 for the first camera.
     pub sigma_pose: [f64; 6],
+    /// Their covariance; `None` for the first camera.
+    pub pose_covariance: Option<Matrix6<f64>>,
     /// Root mean square of the distances between points seen and projected, pixels.
     pub rms_px: f64,
     /// Number of points seen.
@@ -112,6 +118,20 @@ pub struct Calibration {
     pub outliers: Vec<(usize, usize)>,
 }
 
+impl Calibration {
+    /// What was seen less what is projected, pixels, of each point of each view of the setup that it was made from; `None` where a point does
+    /// not project.
+    #[must_use]
+    pub fn residuals(&self, setup: &Setup) -> Vec<Vec<Option<Vector2<f64>>>> {
+        let of_view = |view: &View| {
+            let pose = self.exposures[view.exposure].map(|e| self.cameras[view.camera].cam_from_rig * e);
+            let project = |p: usize| self.cameras[view.camera].camera.project(&pose?.apply(&setup.target[p]));
+            view.points.iter().map(|(p, seen)| project(*p).map(|at| seen - at)).collect()
+        };
+        setup.views.iter().map(of_view).collect()
+    }
+}
+
 /// Calibrates cameras, and the rig that they form, from three or more views each of a flat target.
 ///
 /// Start values by Zhang's constraints (PAMI 2000), then bundle adjustment of interior orientation, rig and the pose of the target at each
@@ -126,13 +146,15 @@ pub fn calibrate(setup: &Setup) -> Result<Calibration, CalibrateError> {
     let options = AdjustOptions { max_iterations: 200, function_tolerance: 1e-12, ..AdjustOptions::default() };
     // Strong distortion before what correlates with it: principal point, higher terms.
     let first_distortion = |model: CameraModel| model.param_kinds().iter().position(|k| *k == ParamKind::Distortion);
-    for block in &mut problem.cameras {
+    for (block, camera) in problem.cameras.iter_mut().zip(&setup.cameras) {
         let kinds = block.camera.model().param_kinds();
         let first = first_distortion(block.camera.model());
-        block.free = std::array::from_fn(|k| kinds.get(k) == Some(&ParamKind::Focal) || first == Some(k));
+        block.free = std::array::from_fn(|k| !camera.held[k] && (kinds.get(k) == Some(&ParamKind::Focal) || first == Some(k)));
     }
     adjust(&mut problem, &options)?;
-    problem.cameras.iter_mut().for_each(|block| block.free = [true; MAX_CAMERA_PARAMS]);
+    for (block, camera) in problem.cameras.iter_mut().zip(&setup.cameras) {
+        block.free = camera.held.map(|held| !held);
+    }
     let mut summary = adjust(&mut problem, &options)?;
     let outliers = remove_outliers(&mut problem, &mut source);
     if !outliers.is_empty() {
@@ -173,7 +195,7 @@ fn problem(setup: &Setup, start: &Start) -> (Problem, Vec<(usize, usize)>) {
 }
 
 /// Residual of each observation, pixels; infinite where it does not project.
-fn residuals(problem: &Problem) -> Vec<f64> {
+pub(crate) fn residuals(problem: &Problem) -> Vec<f64> {
     let residual = |o: &ImageObservation| {
         let cam_from_world = problem.sensors[o.sensor as usize].pose * problem.frames[o.frame as usize].pose;
         let pixel = problem.cameras[o.camera as usize].camera.project(&cam_from_world.apply(&problem.points[o.point as usize].xyz));
@@ -224,20 +246,33 @@ fn finish(
 fn calibrated_camera(problem: &Problem, found: &Covariance, c: usize, (rms_px, observations): (f64, usize)) -> CalibratedCamera {
     let camera = problem.cameras[c].camera;
     let n = camera.params().len();
-    let matrix = found.cameras[c].clone().unwrap_or_else(|| DMatrix::zeros(n, n));
+    let free: Vec<usize> = (0..n).filter(|&k| problem.cameras[c].free[k]).collect();
+    let mut matrix = DMatrix::zeros(n, n);
+    if let Some(found) = &found.cameras[c] {
+        for (i, &a) in free.iter().enumerate() {
+            free.iter().enumerate().for_each(|(j, &b)| matrix[(a, b)] = found[(i, j)]);
+        }
+    }
     let sigma: Vec<f64> = (0..n).map(|k| matrix[(k, k)].sqrt()).collect();
+    let correlation = |i: usize, j: usize| match sigma[i] * sigma[j] {
+        0.0 => f64::from(u8::from(i == j)),
+        product => matrix[(i, j)] / product,
+    };
     let model = camera.model();
     let parameters = (0..n).map(|k| Parameter {
         name: model.param_names()[k],
         value: camera.params()[k],
         sigma: sigma[k],
-        significant: (model.param_kinds()[k] == ParamKind::Distortion).then(|| camera.params()[k].abs() >= SIGNIFICANT_SIGMAS * sigma[k]),
+        significant: (model.param_kinds()[k] == ParamKind::Distortion && sigma[k] > 0.0)
+            .then(|| camera.params()[k].abs() >= SIGNIFICANT_SIGMAS * sigma[k]),
     });
     CalibratedCamera {
         camera,
         parameters: parameters.collect(),
-        correlations: DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (sigma[i] * sigma[j])),
+        correlations: DMatrix::from_fn(n, n, correlation),
+        covariance: matrix,
         cam_from_rig: problem.sensors[c].pose,
+        pose_covariance: found.sensors[c],
         sigma_pose: found.sensors[c].map_or([0.0; 6], |m| std::array::from_fn(|k| m[(k, k)].sqrt())),
         rms_px,
         observations,
