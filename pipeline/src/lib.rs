@@ -3,6 +3,7 @@
 //! Three layers: the command (`cli`) parses, a stage (`stages`) loads, calls and saves, and the algorithm in another
 //! package computes.
 
+mod calibrating;
 pub mod cli;
 pub mod clock;
 pub mod config;

@@ -43,6 +43,11 @@ pub enum Command {
     Surface(SurfaceArgs),
     /// Measure a cloud against a reference in the same frame.
     Eval(EvalArgs),
+    /// Calibrate cameras and their rig from images of a chequerboard, or check whether a calibration still holds.
+    #[command(override_usage = "sfm calibrate [OPTIONS] [CALIB.toml]\n       sfm calibrate [OPTIONS] --check <RIG.toml> <FOLDER>")]
+    Calibrate(CalibrateArgs),
+    /// Tell the refractive index of water, and what it does to the principal distance behind a flat port.
+    Water(WaterArgs),
     /// Adjust a model that another program made with the rig, lengths, sensors and control points of a dive.toml.
     Orient(OrientArgs),
     /// Write a model in the form of another program.
@@ -361,6 +366,55 @@ pub enum Align {
     Icp,
     /// With a scale.
     IcpScale,
+}
+
+/// Arguments of `sfm calibrate`.
+#[derive(Debug, Args)]
+pub struct CalibrateArgs {
+    /// What is calibrated (docs/calibrate.md lists the keys); with --check the folder of new images, one folder a camera in it.
+    #[arg(default_value = "calib.toml")]
+    pub input: PathBuf,
+    /// Compare the calibration of this rig.toml, or calibration.json, with new images of its target.
+    #[arg(long, value_name = "RIG.toml")]
+    pub check: Option<PathBuf>,
+    /// Number of threads; the results are the same with any [default: one a processor].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print calibration.json, or the figures of the check, to stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `sfm water`.
+#[derive(Debug, Args)]
+pub struct WaterArgs {
+    /// Depth, metres.
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    pub depth: f64,
+    /// Practical salinity, parts per thousand: 0 is fresh water, 35 the sea.
+    #[arg(long, value_name = "PPT", allow_negative_numbers = true)]
+    pub salinity: f64,
+    /// Temperature, degrees Celsius.
+    #[arg(long, value_name = "DEGC", allow_negative_numbers = true)]
+    pub temperature: f64,
+    /// Wavelength of the light, nanometres: 540 is the green that cameras see best.
+    #[arg(long, value_name = "NM", default_value_t = 540.0, allow_negative_numbers = true)]
+    pub wavelength: f64,
+    /// Principal distance of a calibration in water, in any unit: its change from there to here is told.
+    #[arg(long, value_name = "C")]
+    pub principal_distance: Option<f64>,
+    /// Depth at which it was calibrated, metres.
+    #[arg(long, value_name = "METRES", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub calibrated_depth: f64,
+    /// Salinity there [default: as here].
+    #[arg(long, value_name = "PPT", allow_negative_numbers = true)]
+    pub calibrated_salinity: Option<f64>,
+    /// Temperature there [default: as here].
+    #[arg(long, value_name = "DEGC", allow_negative_numbers = true)]
+    pub calibrated_temperature: Option<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `sfm orient`.

@@ -1,7 +1,7 @@
 //! From the command line to an exit code.
 
 use super::args::{Cli, Command};
-use super::{bundle, eval, export, help, init, label, mask, orient, run, status, surface, synth, train};
+use super::{bundle, calibrate, eval, export, help, init, label, mask, orient, run, status, surface, synth, train, water};
 use crate::config::ConfigError;
 use crate::error::{Misfit, NoResult};
 use crate::synth::SynthError;
@@ -33,6 +33,8 @@ pub fn main() -> ExitCode {
         Command::Bundle(args) => bundle::bundle(args),
         Command::Orient(args) => orient::orient(args),
         Command::Export(args) => export::export(args),
+        Command::Calibrate(args) => calibrate::calibrate(args),
+        Command::Water(args) => water::water(args),
         Command::Help(args) => help::help(args),
     };
     match result {

@@ -2,6 +2,7 @@
 
 mod args;
 mod bundle;
+mod calibrate;
 mod coloured;
 mod dispatch;
 mod eval;
@@ -19,6 +20,7 @@ mod surface;
 mod synth;
 mod terminal;
 mod train;
+mod water;
 
 pub use args::Cli;
 pub use dispatch::main;

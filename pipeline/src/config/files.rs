@@ -25,6 +25,13 @@ pub(super) fn image_files(base: &Path, images: &str, pattern: &str) -> Result<Ve
     if files.is_empty() { Err(NoFiles::Nothing) } else { Ok(files) }
 }
 
+/// The images in a folder, in natural order; empty where it cannot be read.
+pub(crate) fn images_of_folder(folder: &Path) -> Vec<PathBuf> {
+    let mut files = images_in(folder).unwrap_or_default();
+    files.sort_by(|a, b| natural_order(a, b));
+    files
+}
+
 fn images_in(folder: &Path) -> Result<Vec<PathBuf>, NoFiles> {
     let unreadable = |e: std::io::Error| NoFiles::Unreadable(format!("{}: {e}", folder.display()));
     let mut files = Vec::new();

@@ -51,6 +51,7 @@ pub const KEYS: &[(&str, &str)] = &[
     ("camera.interior.b2", "a number"),
     ("camera.interior.c1", "a number"),
     ("camera.interior.c2", "a number"),
+    ("rig.file", "a TOML file"),
     ("rig.mode", "\"rigid\", \"baselines\" or \"none\""),
     ("rig.baseline.between", "the names of two cameras, [\"C1\", \"C2\"]"),
     ("rig.baseline.length_m", "a number above 0, metres"),

@@ -1,5 +1,6 @@
 //! dive.toml: read with the place of every value ([`read`]), checked, and resolved into a [`Config`].
 
+mod calib;
 mod error;
 mod files;
 mod interior;
@@ -16,9 +17,10 @@ mod stages;
 mod tests;
 mod values;
 
+pub use calib::{BoardConfig, CalibConfig, read_calib};
 pub use error::{ConfigError, ConfigProblem};
 pub use files::IMAGE_EXTENSIONS;
-pub(crate) use files::{NamePart, is_image, natural_key};
+pub(crate) use files::{NamePart, images_of_folder, is_image, natural_key};
 pub(crate) use interior::read_file as read_interior;
 pub use keys::KEYS;
 pub use model::*;

@@ -5,7 +5,7 @@ use super::stage_options::{
 };
 use nalgebra::UnitQuaternion;
 use scene::{CameraModel, FlatPort, Rigid3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// What a run does and with what.
@@ -50,7 +50,7 @@ pub struct Config {
 }
 
 /// How exposures of several cameras pair up into frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FramesFrom {
     /// The n-th image of every camera.

@@ -97,6 +97,7 @@ raw_interior!(f fx fy cx cy k k1 k2 k3 k4 p1 p2 c x0 y0 a1 a2 a3 b1 b2 c1 c2);
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawRig {
+    pub(super) file: Place<PathText>,
     pub(super) mode: Place<String>,
     pub(super) baseline: Vec<Spanned<RawBaseline>>,
     pub(super) pose: BTreeMap<Spanned<String>, Spanned<RawPose>>,

@@ -84,7 +84,7 @@ fn type_hint(key: &str) -> Option<String> {
 fn resolve(source: &mut Source<'_>, raw: &RawConfig, file: &Path) -> Config {
     let folder = file.parent().unwrap_or(Path::new(""));
     let cameras = cameras(source, &raw.camera, folder);
-    let rig = rig::resolve(source, &raw.rig, &cameras);
+    let rig = rig::resolve(source, &raw.rig, &cameras, folder);
     let scale_bars = rig::scale_bars(source, &raw.scale_bar, &cameras);
     let origin_m = sensors::origin(source, &raw.world);
     let sensors = sensors::sensors(source, raw.sensors.as_ref(), folder);
@@ -118,7 +118,7 @@ fn resolve(source: &mut Source<'_>, raw: &RawConfig, file: &Path) -> Config {
     }
 }
 
-fn cameras(source: &mut Source<'_>, raw: &[Spanned<RawCamera>], folder: &Path) -> Vec<CameraConfig> {
+pub(super) fn cameras(source: &mut Source<'_>, raw: &[Spanned<RawCamera>], folder: &Path) -> Vec<CameraConfig> {
     if raw.is_empty() {
         let hint = "add a [[camera]] with `images = \"folder\"`, or let `sfm init FOLDER` write one";
         source.problem(None, "camera", "no camera is given", Some(hint.to_owned()));

@@ -1,29 +1,63 @@
 //! `[rig]` and `[[scale_bar]]`.
 
 use super::error::{Source, did_you_mean};
+use super::keys::check_names;
 use super::model::{BaselineConfig, CameraConfig, PickConfig, PoseConfig, RigConfig, RigMode, ScaleBarConfig, TargetConfig};
 use super::raw::{Place, RawBaseline, RawPick, RawPose, RawRig, RawScaleBar};
+use super::resolve::raw_table;
 use super::values::Values;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use scene::Rigid3;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::path::Path;
 use toml::Spanned;
 
 /// Standard deviation of a length of which none is given, metres.
 const DEFAULT_SIGMA_M: f64 = 0.001;
 /// How far from a pick the centre of a target may be, pixels, where it is not said.
 const DEFAULT_SEARCH_RADIUS_PX: f64 = 10.0;
+const MODES: [(&str, RigMode); 3] = [("rigid", RigMode::Rigid), ("baselines", RigMode::Baselines), ("none", RigMode::None)];
 /// Largest deviation of a given rotation matrix from orthonormality, and of a quaternion from length 1.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
-pub(super) fn resolve(source: &mut Source<'_>, raw: &RawRig, cameras: &[CameraConfig]) -> RigConfig {
+/// The rig of a dive.toml; `folder` is where relative file names start.
+pub(super) fn resolve(source: &mut Source<'_>, raw: &RawRig, cameras: &[CameraConfig], folder: &Path) -> RigConfig {
+    let Some(file) = &raw.file else { return of_keys(source, raw, cameras) };
+    let key = "rig.file";
+    if !raw.pose.is_empty() || !raw.baseline.is_empty() {
+        let hint = "give either `file`, or poses and baselines".to_owned();
+        source.problem(Some(file.span()), key, "stands beside poses or baselines", Some(hint));
+    }
+    let path = folder.join(file.get_ref().as_str());
+    let read = std::fs::read_to_string(&path).map(|text| {
+        let mut inner = Source::new(&path, &text);
+        let rig = raw_table::<RawRig>(&mut inner, |inner, table| check_names(inner, table, "rig")).map(|below| {
+            if let Some(again) = &below.file {
+                inner.problem(Some(again.span()), key, "leads to yet another file", None);
+            }
+            of_keys(&mut inner, &below, cameras)
+        });
+        inner.finish(rig)
+    });
+    match read {
+        Err(e) => source.problem(Some(file.span()), key, format!("cannot read {}: {e}", path.display()), None),
+        Ok(Err(error)) => source.add(error),
+        // What stands in dive.toml goes before what stands in the file.
+        Ok(Ok(rig)) => {
+            let mode = (Values { source }).choice("rig.mode", &raw.mode, &MODES).unwrap_or(rig.mode);
+            return RigConfig { mode, ..rig };
+        }
+    }
+    RigConfig { mode: RigMode::None, poses: Vec::new(), baselines: Vec::new() }
+}
+
+fn of_keys(source: &mut Source<'_>, raw: &RawRig, cameras: &[CameraConfig]) -> RigConfig {
     let mut values = Values { source };
     let baselines = baselines(&mut values, &raw.baseline, cameras);
     let poses = poses(&mut values, &raw.pose, cameras);
-    let modes = [("rigid", RigMode::Rigid), ("baselines", RigMode::Baselines), ("none", RigMode::None)];
     let all_posed = cameras.len() > 1 && poses.iter().skip(1).all(Option::is_some) && poses.len() == cameras.len();
-    let mode = values.choice("rig.mode", &raw.mode, &modes).unwrap_or(match () {
+    let mode = values.choice("rig.mode", &raw.mode, &MODES).unwrap_or(match () {
         () if all_posed => RigMode::Rigid,
         () if !baselines.is_empty() => RigMode::Baselines,
         () => RigMode::None,

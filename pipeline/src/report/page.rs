@@ -1,6 +1,7 @@
 //! The page.
 
 use super::escape::{html, script_json};
+use super::picture::{self, Picture};
 use super::scene3d::{Scene3d, packed};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -45,6 +46,17 @@ pub struct Thumbnail {
     pub jpeg: Vec<u8>,
 }
 
+/// Pictures below a heading.
+#[derive(Clone, Debug)]
+pub struct Gallery {
+    /// Heading.
+    pub title: String,
+    /// What the marks mean, or empty.
+    pub note: String,
+    /// The pictures.
+    pub pictures: Vec<Picture>,
+}
+
 /// Everything on the page.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
@@ -60,6 +72,8 @@ pub struct Report {
     pub scene: Scene3d,
     /// Tables.
     pub sections: Vec<Section>,
+    /// Drawings, between tables and pictures.
+    pub galleries: Vec<Gallery>,
     /// Pictures.
     pub thumbnails: Vec<Thumbnail>,
 }
@@ -103,6 +117,7 @@ pub fn render(report: &Report) -> String {
             ("figures", &figures),
             ("warnings", &warnings),
             ("sections", &sections),
+            ("galleries", &report.galleries.iter().map(gallery).collect::<String>()),
             ("thumbnails", &thumbnails),
             ("scene", &script_json(&packed(&report.scene))),
         ],
@@ -138,6 +153,12 @@ fn section(section: &Section) -> String {
         "<section><h2>{}</h2>{note}<div class=\"scroll\"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div></section>",
         html(&section.title)
     )
+}
+
+fn gallery(gallery: &Gallery) -> String {
+    let pictures: String = gallery.pictures.iter().map(picture::render).collect();
+    let note = if gallery.note.is_empty() { String::new() } else { format!("<p>{}</p>", html(&gallery.note)) };
+    format!("<section><h2>{}</h2>{note}<div class=\"thumbs\">{pictures}</div></section>", html(&gallery.title))
 }
 
 fn thumbnail(thumbnail: &Thumbnail) -> String {

@@ -15,7 +15,7 @@ pub mod model;
 pub mod orient;
 mod orient_figures;
 mod page;
-mod pairing;
+pub(crate) mod pairing;
 pub mod report;
 mod single_masks;
 pub mod surface;

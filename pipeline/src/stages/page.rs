@@ -39,6 +39,7 @@ pub(super) fn page(work: &Work<'_>, figures: &Value) -> Result<Report> {
         warnings,
         scene: scene(work, &model)?,
         sections: sections(figures),
+        galleries: Vec::new(),
         thumbnails: thumbnails(work, &list, &model)?,
     })
 }

@@ -6,19 +6,19 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What is known of the instant of an image.
 #[derive(Clone, Debug)]
-pub(super) struct Exposure {
+pub(crate) struct Exposure {
     /// Index of the camera.
-    pub(super) camera: usize,
+    pub(crate) camera: usize,
     /// Position among the camera's files, those that cannot be read included.
-    pub(super) position: usize,
+    pub(crate) position: usize,
     /// File name without extension.
-    pub(super) stem: String,
+    pub(crate) stem: String,
     /// Time of exposure, seconds from any origin that the cameras share.
-    pub(super) time_secs: Option<f64>,
+    pub(crate) time_secs: Option<f64>,
 }
 
 /// Numbers the exposures from 0; images with one number were exposed together. What has no partner is a warning.
-pub(super) fn pair_up(cameras: &[&str], images: &[Exposure], rule: FramesFrom) -> (Vec<u32>, Vec<Warning>) {
+pub(crate) fn pair_up(cameras: &[&str], images: &[Exposure], rule: FramesFrom) -> (Vec<u32>, Vec<Warning>) {
     if cameras.len() < 2 {
         return ((0..images.len() as u32).collect(), Vec::new());
     }
