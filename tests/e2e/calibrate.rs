@@ -396,4 +396,20 @@ fn water_has_its_index_and_changes_the_principal_distance() {
     assert!(dive.ok(&reef).starts_with("Quan & Fry 1995"));
     let (code, message) = dive.fails(&["water", "--depth", "-5", "--salinity", "35", "--temperature", "19"]);
     assert!(code == 2 && message.contains("depth -5 m is not from 0 to 11000"), "{message}");
+
+    // A log: of the temperature a column, of the salinity the option; a line without depth is left out.
+    dive.write("sensors.csv", "time_s,depth_m,heading_deg,temperature_degc\n0,25,90,19\n1,,91,\n2,0,92,\n");
+    let log = ["water", "--log", "sensors.csv", "--salinity", "35", "--temperature", "12"];
+    let table = dive.ok(&[&log[..], &["--principal-distance", "6.7108", "--calibrated-temperature", "19"]].concat());
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert_eq!((rows.len(), &rows[0][..4], &rows[1][..4]), (2, &["0", "25", "35", "19"][..], &["2", "0", "35", "12"][..]), "{table}");
+    let first: f64 = rows[0][4].parse().unwrap();
+    assert!((first - found["formulas"][0]["index"].as_f64().unwrap()).abs() < 1e-8);
+    let distance: f64 = rows[0][7].parse().unwrap();
+    assert!((distance - 6.7108 - change).abs() < 1e-7, "{table}");
+    dive.write("sensors.csv", "time_s,depth_m\n0,deep\n");
+    let (code, message) = dive.fails(&log);
+    assert!(code == 2 && message.contains("line 2: \"deep\" is no number"), "{message}");
+    dive.write("sensors.csv", "time_s,up_m\n0,1\n");
+    assert!(dive.fails(&log).1.contains("there is no column depth_m; the columns are time_s, up_m"));
 }

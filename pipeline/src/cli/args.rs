@@ -389,8 +389,11 @@ pub struct CalibrateArgs {
 #[derive(Debug, Args)]
 pub struct WaterArgs {
     /// Depth, metres.
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
-    pub depth: f64,
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, required_unless_present = "log")]
+    pub depth: Option<f64>,
+    /// A log of the vehicle with a column depth_m, and perhaps salinity_ppt and temperature_degc: a table of all its lines is printed.
+    #[arg(long, value_name = "CSV", conflicts_with_all = ["depth", "json"])]
+    pub log: Option<PathBuf>,
     /// Practical salinity, parts per thousand: 0 is fresh water, 35 the sea.
     #[arg(long, value_name = "PPT", allow_negative_numbers = true)]
     pub salinity: f64,
