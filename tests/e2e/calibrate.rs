@@ -261,6 +261,42 @@ fn what_makes_no_calibration_is_refused_with_the_reason() {
     assert!(code == 1 && message.contains("holds no calibration"), "{message}");
 }
 
+/// Frames of the first camera as a video of 5 frames a second.
+fn video(dive: &Dive, file: &str, poses: &[Rigid3]) {
+    use opencv::core::{Mat, MatTraitManual, Size};
+    use opencv::videoio::{VideoWriter, VideoWriterTrait};
+    let code = VideoWriter::fourcc('M', 'J', 'P', 'G').unwrap();
+    let mut writer = VideoWriter::new(dive.path(file), code, 5.0, Size::new(SIZE.0 as i32, SIZE.1 as i32), true).unwrap();
+    let directions = directions(&camera(0));
+    for (e, pose) in poses.iter().enumerate() {
+        let grey = image(&directions, pose, e as u64);
+        let mut frame = Mat::new_rows_cols_with_default(SIZE.1 as i32, SIZE.0 as i32, opencv::core::CV_8UC3, 0.0.into()).unwrap();
+        frame.data_bytes_mut().unwrap().chunks_mut(3).zip(grey.data()).for_each(|(pixel, value)| pixel.fill(*value));
+        writer.write(&frame).unwrap();
+    }
+    writer.release().unwrap();
+}
+
+#[test]
+fn a_video_is_searched_frame_by_frame() {
+    let dive = Dive::empty();
+    video(&dive, "board.avi", &poses(9, 5));
+    dive.write("calib.toml", &calib(&["x"], COLUMNS).replace("images = \"x\"", "video = \"board.avi\"\nrate_hz = 5.0"));
+    let record: Value = serde_json::from_str(&dive.ok(&["calibrate", "--json"])).unwrap();
+    assert_eq!((&record["images"]["found"], &record["images"]["with_target"]), (&9.into(), &9.into()));
+    assert_eq!(record["photographs"][8]["name"], "C1/000008");
+    assert_eq!((&record["cameras"][0]["sigma0_alone_px"], record["baselines"].as_array().unwrap().len()), (&Value::Null, 0));
+    let c = parameter(&record, 0, "c");
+    let (value, sigma) = (c["value"].as_f64().unwrap(), c["sigma"].as_f64().unwrap());
+    // Compression moves corners a little, the same way in all frames.
+    assert!((value - 430.0).abs() < (4.0 * sigma).max(0.5), "{value} +- {sigma}");
+    // The one camera is checked by calibration.json, with images in the folder itself.
+    render(&dive, "later", &poses(8, 6), &rig()[..1], 300);
+    let check = dive.ok(&["calibrate", "--check", "calibration/calibration.json", "later/C1", "--json"]);
+    let check: Value = serde_json::from_str(&check).unwrap();
+    assert!(check["cameras"][0]["shift_rms_px"].as_f64().unwrap() < 0.3 && check["cameras"][0]["pose"].is_null(), "{check:#}");
+}
+
 #[test]
 fn a_wrong_calib_toml_is_told_with_its_place() {
     let dive = Dive::of_noise();

@@ -29,7 +29,12 @@ pub(super) fn water(args: &WaterArgs) -> Result<()> {
     };
     let both = [of(IndexFormula::QuanFry), of(IndexFormula::Hoehle)];
     if args.json {
-        let water = |w: &Water| json!({"depth_m": w.depth_m, "salinity_ppt": w.salinity_ppt, "temperature_degc": w.temperature_degc, "wavelength_nm": w.wavelength_nm});
+        let water = |w: &Water| {
+            let (salinity, temperature) = (w.salinity_ppt, w.temperature_degc);
+            json!({
+                "depth_m": w.depth_m, "salinity_ppt": salinity, "temperature_degc": temperature, "wavelength_nm": w.wavelength_nm,
+            })
+        };
         let formulas = both.iter().map(|(formula, index, calibrated, change)| {
             json!({
                 "formula": formula.name(), "index": index, "calibrated_index": calibrated, "ratio": index / calibrated,
