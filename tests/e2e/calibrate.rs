@@ -411,6 +411,22 @@ fn photographs_of_opencv_give_its_calibration() {
     }
     assert!(rms <= opencv.rms_px, "{rms}, OpenCV {}", opencv.rms_px);
     assert!(record["rectifications"][0]["rms_px"].as_f64().unwrap() < 2.0 * rms);
+
+    // Halves of them, taken in one go, show no drift.
+    for (k, number) in [1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14].into_iter().enumerate() {
+        for side in ["left", "right"] {
+            let to = dive.path(["first", "second"][k % 2]).join(side);
+            std::fs::create_dir_all(&to).unwrap();
+            let file = format!("{side}{number:02}.jpg");
+            std::fs::copy(folder.join(&file), to.join(&file)).unwrap();
+        }
+    }
+    let half = |name: &str| format!("[[camera]]\nname = \"{name}\"\nimages = \"first/{name}\"\ninterior.model = \"opencv\"\n");
+    dive.write("calib.toml", &format!("[target]\ncolumns = 9\nrows = 6\nsquare_m = 0.025\n{}{}", half("left"), half("right")));
+    dive.ok(&["calibrate"]);
+    let check: Value = serde_json::from_str(&dive.ok(&["calibrate", "--check", "calibration/rig.toml", "second", "--json"])).unwrap();
+    assert!(["holds", "doubtful"].contains(&check["verdict"].as_str().unwrap()), "{check:#}");
+    assert!(check["held"]["ratio"].as_f64().unwrap() < 1.5, "{check:#}");
 }
 
 #[test]
