@@ -10,6 +10,7 @@ use dense::{
 use nalgebra::{Vector2, Vector3};
 use scene::{ImageId, Raster, Reconstruction};
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::error::Error;
 use std::path::Path;
 
@@ -59,15 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let views = images.iter().map(|&i| Ok((i, read_view(dive, &model, i)?))).collect::<Result<BTreeMap<_, _>, Box<dyn Error>>>()?;
     let depths = images.iter().map(|&i| Ok((i, read_depth(dive, &model, i)?))).collect::<Result<BTreeMap<_, _>, Box<dyn Error>>>()?;
     let (mut counts, mut maps, mut seconds) = ([Counts::default(); BANDS.len()], BTreeMap::new(), 0.0);
-    let var = |name: &str, default: f64| std::env::var(name).ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(default);
-    let options = DepthOptions {
-        min_correlation: var("MINCORR", 0.5) as f32,
-        min_segment: var("MINSEG", 40.0) as usize,
-        noise: var("NOISE", 0.7) as f32,
-        colour_sigma: var("CSIG", 20.0) as f32,
-        ..DepthOptions::default()
-    };
-    let selection = ViewSelectionOptions { max_views: var("VIEWS", 5.0) as usize, ..Default::default() };
+    let (options, selection) = (DepthOptions::default(), ViewSelectionOptions::default());
     for (number, &image) in images.iter().enumerate() {
         if number % every != 0 && cloud.is_none() {
             continue;
@@ -75,19 +68,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let neighbours = select_views(&model, image, &selection);
         let Some(range) = depth_range(&model, image) else { continue };
         let others: Vec<&View> = neighbours.iter().map(|i| &views[i]).collect();
-        let cached = std::env::var("MAPS").ok().map(|m| Path::new(&m).join(format!("{}.bin", image.0)));
-        if let Some(bytes) = cached.as_ref().and_then(|c| std::fs::read(c).ok()) {
-            maps.insert(image, DepthMap::from_bytes(&bytes)?);
-            continue;
-        }
         let start = cpu_time::ProcessTime::now();
         let map = estimate_depth_from_seeds(&views[&image], &others, range, &depth_seeds(&model, image), &options)?;
         seconds += start.elapsed().as_secs_f64();
         if number % every == 0 {
             count(&map, &views, &depths, &mut counts);
-        }
-        if let Some(c) = cached {
-            std::fs::write(c, map.to_bytes())?;
         }
         maps.insert(image, map);
     }
@@ -107,17 +92,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
     }
     if let Some(cloud) = cloud {
-        let wide = ViewSelectionOptions { max_views: var("FVIEWS", 5.0) as usize, ..Default::default() };
-        for (image, map) in &mut maps {
-            map.neighbours = select_views(&model, *image, &wide);
-        }
-        let fopt = FusionOptions {
-            min_views: var("MINVIEWS", 3.0) as usize,
-            max_relative_depth: var("RELD", 0.02),
-            max_reprojection_px: var("REPRO", 1.0),
-            ..FusionOptions::default()
-        };
-        let fusion = fuse(&images, |i| Ok::<_, std::convert::Infallible>(maps.get(&i).cloned()), &fopt)?;
+        let fusion = fuse(&images, |i| Ok::<_, Infallible>(maps.get(&i).cloned()), &FusionOptions::default())?;
         println!("{:?}", fusion.summary);
         scene::format::write_ply_cloud(&fusion.cloud, &mut std::io::BufWriter::new(std::fs::File::create(cloud)?))?;
     }
