@@ -34,7 +34,7 @@ impl Default for GuidedOptions {
 ///
 /// The strongest keypoints are matched exhaustively and verified. If enough agree, a keypoint of the image with the lower id is compared with
 /// those of the other within a window: where the agreeing matches nearest to it put it, with a margin for what differs in depth. Else every keypoint is
-/// compared with every other. The tests of `matching` apply to what is compared. All matches are verified in the end, see [`verify_pair`].
+/// compared with every other. The tests of `matching` apply to what is compared. All matches are verified in the end, see [`crate::verify_pair`].
 ///
 /// The window has two dimensions, no epipolar line: right matches have rivals beside it, as they have in an exhaustive scan, and the
 /// geometry of the strongest decides nothing but where is looked. The order of the images does not matter. The result depends on the
