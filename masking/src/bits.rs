@@ -46,20 +46,15 @@ impl BitMask {
     /// When the image has no pixels but the mask has, or `factor` is zero.
     #[must_use]
     pub fn to_mask(&self, width: usize, height: usize, factor: usize) -> Mask {
+        assert!(factor > 0, "a factor of zero");
         let mut mask: Mask = Raster::filled(width, height, 0);
-        let mut line = vec![0u8; width];
-        let mut drawn = None;
         for y in 0..height {
-            let source = (y / factor).min(self.height - 1);
-            if drawn != Some(source) {
-                drawn = Some(source);
-                let row = self.row(source);
-                for (x, pixels) in line.chunks_mut(factor).enumerate() {
-                    let x = x.min(self.width - 1);
-                    pixels.fill(if row[x / 64] >> (x % 64) & 1 == 1 { 255 } else { 0 });
-                }
-            }
-            mask.row_mut(y).copy_from_slice(&line);
+            let row = self.row((y / factor).min(self.height - 1));
+            let line = mask.row_mut(y);
+            for_runs(row, self.width, |from, to| {
+                let end = if to == self.width { width } else { width.min(to * factor) };
+                line[(from * factor).min(end)..end].fill(255);
+            });
         }
         mask
     }
@@ -168,6 +163,26 @@ impl BitMask {
     }
 }
 
+/// Calls with the first column of every run of set pixels in a row of `width` pixels, and the column after its last.
+pub(crate) fn for_runs(row: &[u64], width: usize, mut f: impl FnMut(usize, usize)) {
+    let mut open: Option<usize> = None;
+    for (i, &word) in row.iter().enumerate() {
+        // Bits where the row changes with respect to the pixel before.
+        let mut changes = word ^ ((word << 1) | u64::from(open.is_some()));
+        while changes != 0 {
+            let x = 64 * i + changes.trailing_zeros() as usize;
+            match open.take() {
+                None => open = Some(x),
+                Some(from) => f(from, x),
+            }
+            changes &= changes - 1;
+        }
+    }
+    if let Some(from) = open {
+        f(from, width);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,6 +203,27 @@ mod tests {
             assert_eq!(bits.not().not(), bits);
             assert_eq!(bits.count_common(&bits.not()), 0);
             assert_eq!(bits.and(&bits), bits);
+        }
+    }
+
+    #[test]
+    fn squares_are_cut_at_the_border_or_continued_to_it() {
+        for (w, h, factor) in [(1, 1, 3), (67, 5, 2), (130, 9, 5)] {
+            let small = pattern(w, h);
+            let bits = BitMask::from_mask(&small);
+            // One pixel less than the squares cover, and some more than that.
+            for (width, height) in [(w * factor - 1, h * factor - 1), (w * factor + 7, h * factor + 3)] {
+                let mask = bits.to_mask(width, height, factor);
+                for y in 0..height {
+                    for x in 0..width {
+                        assert_eq!(
+                            mask[(x, y)],
+                            small[((x / factor).min(w - 1), (y / factor).min(h - 1))],
+                            "{x} {y} of {width} x {height}"
+                        );
+                    }
+                }
+            }
         }
     }
 

@@ -2,7 +2,6 @@
 
 use crate::lowpass::STEPS;
 use crate::{BitMask, Plane, keep_components};
-use scene::Raster;
 
 /// Hysteresis thresholds, grey values of 0..=255 per pixel of the plane along the gradient.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,73 +29,96 @@ pub fn canny(plane: &Plane, thresholds: &CannyThresholds) -> BitMask {
     }
     let steps = |threshold: f64| (threshold * UNIT).clamp(0.0, f64::from(u16::MAX)) as u16;
     let (low, high) = (steps(thresholds.low.min(thresholds.high)), steps(thresholds.high));
-    let magnitudes = magnitudes(plane);
+    // Three rows of gradients roll over the image and stay in the cache.
+    let mut lines: [Line; 3] = std::array::from_fn(|_| Line::new(w));
+    lines[2].differentiate(plane, 0);
     for y in 0..h {
-        let row = magnitudes.row(y);
-        for (x, &m) in row.iter().enumerate() {
-            if m > low && is_ridge(plane, &magnitudes, x, y) {
-                weak.set(x, y);
-                if m > high {
-                    strong.set(x, y);
+        lines.rotate_left(1);
+        if y + 1 < h {
+            lines[2].differentiate(plane, y + 1)
+        } else {
+            lines[2].lengths.fill(0)
+        }
+        let [above, here, below] = &lines;
+        for (i, lengths) in here.lengths[1..=w].chunks(64).enumerate() {
+            let (mut weak_bits, mut strong_bits) = (0u64, 0u64);
+            for (bit, &m) in lengths.iter().enumerate() {
+                if m > low && is_ridge(above, here, below, 64 * i + bit) {
+                    weak_bits |= 1 << bit;
+                    strong_bits |= u64::from(m > high) << bit;
                 }
             }
+            weak.row_mut(y)[i] = weak_bits;
+            strong.row_mut(y)[i] = strong_bits;
         }
     }
     keep_components(&weak, &strong, |_, strong| strong > 0)
 }
 
-/// Lengths of the Sobel gradients, in 1/128 grey value per pixel.
-fn magnitudes(plane: &Plane) -> Raster<u16> {
-    let (w, h) = (plane.width(), plane.height());
-    let mut out = Raster::filled(w, h, 0u16);
-    // Vertical sums 1 2 1 and differences of one row, its border continued. Values up to 4080: sums up to 16,320 fit 16 bits with a sign.
-    let (mut sums, mut differences) = (vec![0i16; w + 2], vec![0i16; w + 2]);
-    for y in 0..h {
+/// Sobel gradients of one row, in 1/128 grey value per pixel.
+struct Line {
+    gx: Vec<i16>,
+    gy: Vec<i16>,
+    /// Their lengths, with a zero before the first and after the last pixel.
+    lengths: Vec<u16>,
+    /// Vertical sums 1 2 1 and differences, with the border continued by a pixel.
+    sums: Vec<i16>,
+    differences: Vec<i16>,
+}
+
+impl Line {
+    fn new(w: usize) -> Self {
+        Self { gx: vec![0; w], gy: vec![0; w], lengths: vec![0; w + 2], sums: vec![0; w + 2], differences: vec![0; w + 2] }
+    }
+
+    /// Takes the gradients of row `y`.
+    fn differentiate(&mut self, plane: &Plane, y: usize) {
+        let (w, h) = (plane.width(), plane.height());
         let (above, here, below) = (plane.row(y.saturating_sub(1)), plane.row(y), plane.row((y + 1).min(h - 1)));
-        for (((s, &a), &c), &b) in sums[1..=w].iter_mut().zip(above).zip(here).zip(below) {
+        // Values up to 4080: sums up to 16,320 fit 16 bits with a sign.
+        for (((s, &a), &c), &b) in self.sums[1..=w].iter_mut().zip(above).zip(here).zip(below) {
             *s = (a + 2 * c + b) as i16;
         }
-        for ((d, &a), &b) in differences[1..=w].iter_mut().zip(above).zip(below) {
+        for ((d, &a), &b) in self.differences[1..=w].iter_mut().zip(above).zip(below) {
             *d = b as i16 - a as i16;
         }
-        for line in [&mut sums, &mut differences] {
+        for line in [&mut self.sums, &mut self.differences] {
             (line[0], line[w + 1]) = (line[1], line[w]);
         }
-        for ((m, s), d) in out.row_mut(y).iter_mut().zip(sums.windows(3)).zip(differences.windows(3)) {
-            let (gx, gy) = ((s[2] - s[0]).unsigned_abs(), (d[0] + 2 * d[1] + d[2]).unsigned_abs());
+        for (gx, s) in self.gx.iter_mut().zip(self.sums.windows(3)) {
+            *gx = s[2] - s[0];
+        }
+        for (gy, d) in self.gy.iter_mut().zip(self.differences.windows(3)) {
+            *gy = d[0] + 2 * d[1] + d[2];
+        }
+        for ((m, gx), gy) in self.lengths[1..=w].iter_mut().zip(&self.gx).zip(&self.gy) {
+            let (gx, gy) = (gx.unsigned_abs(), gy.unsigned_abs());
             *m = gx.max(gy) + 3 * gx.min(gy) / 8;
         }
     }
-    out
 }
 
-/// Whether the gradient at (x, y) is not shorter than its neighbours along its direction. Of two equal neighbours the later one wins.
-fn is_ridge(plane: &Plane, magnitudes: &Raster<u16>, x: usize, y: usize) -> bool {
-    let (w, h) = (plane.width(), plane.height());
-    let at = |dx: isize, dy: isize| i32::from(plane[(x.saturating_add_signed(dx).min(w - 1), y.saturating_add_signed(dy).min(h - 1))]);
-    let gx = at(1, -1) + 2 * at(1, 0) + at(1, 1) - at(-1, -1) - 2 * at(-1, 0) - at(-1, 1);
-    let gy = at(-1, 1) + 2 * at(0, 1) + at(1, 1) - at(-1, -1) - 2 * at(0, -1) - at(1, -1);
-    // tan 22.5 deg = 0.41421 = 13,573 / 32,768.
-    let (dx, dy) = if gy.abs() * 32_768 < gx.abs() * 13_573 {
-        (1, 0)
+/// Whether the gradient at column `x` of the middle row is not shorter than its neighbours along its direction. Of two equal neighbours the later one wins.
+fn is_ridge(above: &Line, here: &Line, below: &Line, x: usize) -> bool {
+    let (gx, gy) = (i32::from(here.gx[x]), i32::from(here.gy[x]));
+    // Column x is entry x + 1 of the lengths. tan 22.5 deg = 0.41421 = 13,573 / 32,768.
+    let (before, after) = if gy.abs() * 32_768 < gx.abs() * 13_573 {
+        (here.lengths[x], here.lengths[x + 2])
     } else if gx.abs() * 32_768 < gy.abs() * 13_573 {
-        (0, 1)
+        (above.lengths[x + 1], below.lengths[x + 1])
     } else if (gx < 0) == (gy < 0) {
-        (1, 1)
+        (above.lengths[x], below.lengths[x + 2])
     } else {
-        (-1, 1)
+        (above.lengths[x + 2], below.lengths[x])
     };
-    let magnitude = |sign: isize| {
-        let (u, v) = (x.checked_add_signed(sign * dx), y.checked_add_signed(sign * dy));
-        u.zip(v).and_then(|(u, v)| magnitudes.get(u, v)).copied().unwrap_or(0)
-    };
-    let here = magnitudes[(x, y)];
-    here >= magnitude(-1) && here > magnitude(1)
+    let length = here.lengths[x + 1];
+    length >= before && length > after
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scene::Raster;
 
     fn plane(w: usize, h: usize, value: impl Fn(f64, f64) -> f64) -> Plane {
         let values = (0..w * h).map(|i| (value((i % w) as f64 + 0.5, (i / w) as f64 + 0.5) * 16.0).round() as u16).collect();
@@ -117,10 +139,11 @@ mod tests {
     #[test]
     fn gradient_lengths_are_near_the_euclidean_ones() {
         let plane = plane(40, 30, |x, y| 120.0 + 60.0 * (x / 3.0).sin() * (y / 4.0).cos());
-        let found = magnitudes(&plane);
+        let mut line = Line::new(40);
         for y in 0..30 {
+            line.differentiate(&plane, y);
             for x in 0..40 {
-                let (found, expected) = (f64::from(found[(x, y)]) / UNIT, gradient(&plane, x, y));
+                let (found, expected) = (f64::from(line.lengths[x + 1]) / UNIT, gradient(&plane, x, y));
                 // The larger + 3/8 of the smaller: 0.972 at 45 deg, 1.068 at 20.6 deg; one step for the division.
                 assert!(found >= expected * 0.972 - 1.0 / UNIT && found <= expected * 1.069 + 1.0 / UNIT, "{found} {expected}");
             }

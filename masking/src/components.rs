@@ -1,6 +1,7 @@
 //! Connected components, by runs: 8-connected for structure, so that holes are 4-connected.
 
 use crate::BitMask;
+use crate::bits::for_runs;
 
 /// A horizontal run of set pixels: columns `from..to` of row `y`.
 #[derive(Clone, Copy)]
@@ -92,22 +93,7 @@ fn runs(image: &BitMask) -> (Vec<Run>, Vec<usize>) {
     let mut starts = Vec::with_capacity(image.height() + 1);
     for y in 0..image.height() {
         starts.push(runs.len());
-        let mut open: Option<usize> = None;
-        for (i, &word) in image.row(y).iter().enumerate() {
-            // Bits where the row changes with respect to the pixel before.
-            let mut changes = word ^ ((word << 1) | u64::from(open.is_some()));
-            while changes != 0 {
-                let x = 64 * i + changes.trailing_zeros() as usize;
-                match open.take() {
-                    None => open = Some(x),
-                    Some(from) => runs.push(Run { y, from, to: x }),
-                }
-                changes &= changes - 1;
-            }
-        }
-        if let Some(from) = open {
-            runs.push(Run { y, from, to: image.width() });
-        }
+        for_runs(image.row(y), image.width(), |from, to| runs.push(Run { y, from, to }));
     }
     starts.push(runs.len());
     (runs, starts)
